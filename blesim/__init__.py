@@ -1,0 +1,3 @@
+"""A Bluetooth-beacon store in software: simulate, record, position and score."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,154 @@
+"""A recording: what phones observed in a venue. Truth is another object and travels apart."""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from functools import cached_property
+from types import MappingProxyType
+
+from blesim import columns
+from blesim.errors import DataError
+from blesim.tables import (
+    Imu,
+    Marks,
+    Packets,
+    Readings,
+    Steps,
+    StepTruth,
+    Table,
+    Trajectory,
+)
+from blesim.venue.venue import Venue
+
+SCHEMA_VERSION = "1.0"
+
+
+class WalkKind(IntEnum):
+    """What a walk is for."""
+
+    SURVEY = dict(columns.KINDS)["survey"]
+    WALK = dict(columns.KINDS)["walk"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Observations:
+    """What one phone reports, in order of time; a stream it does not have is empty."""
+
+    readings: Readings = field(default_factory=Readings.empty)
+    imu: Imu = field(default_factory=Imu.empty)
+    steps: Steps = field(default_factory=Steps.empty)
+    marks: Marks = field(default_factory=Marks.empty)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return the streams in the order of `columns.OBSERVATIONS`."""
+        return (self.readings, self.imu, self.steps, self.marks)
+
+    def between(self, start_us: int, end_us: int) -> "Observations":
+        """Return what happened from `start_us` until just before `end_us`. [us]."""
+        parts = [
+            table.rows(slice(*table[table.STREAM.columns[0]].searchsorted([start_us, end_us])))
+            for table in self.tables()
+        ]
+        return Observations(readings=parts[0], imu=parts[1], steps=parts[2], marks=parts[3])  # type: ignore[arg-type]  # rows() keeps each type
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Walk:
+    """One walk of one phone.
+
+    Attributes
+    ----------
+    name : str
+        Unique in its recording.
+    walker, phone, carrying : str
+        Who walked, with which phone profile, carried how.
+    kind : WalkKind
+        Survey walks are for learning, the others for trying.
+    split : str
+        Part of a benchmark, such as ``"tuning"``; may be empty.
+    observations : Observations
+        What the phone reported.
+    """
+
+    name: str
+    walker: str
+    phone: str
+    carrying: str = "hand"
+    kind: WalkKind = WalkKind.WALK
+    split: str = ""
+    observations: Observations = field(default_factory=Observations)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WalkTruth:
+    """What really happened on one walk; opened by `metrics` alone."""
+
+    trajectory: Trajectory = field(default_factory=Trajectory.empty)
+    steps: StepTruth = field(default_factory=StepTruth.empty)
+    packets: Packets = field(default_factory=Packets.empty)
+
+    def tables(self) -> tuple[Table, ...]:
+        """Return the streams in the order of `columns.TRUTH`."""
+        return (self.trajectory, self.steps, self.packets)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Provenance:
+    """Where a recording comes from: the attributes at the root of its file.
+
+    Attributes
+    ----------
+    title, source, license : str
+        What it shows; what made it; under which terms it may be used.
+    scenario : str
+        Text of the scenario, verbatim; empty for a real recording.
+    seed : int or None
+        Seed of the simulation; none for a real recording.
+    references : str
+        What to cite, and what was left out on the way in.
+    """
+
+    title: str
+    source: str
+    license: str = "CC0-1.0"
+    scenario: str = ""
+    seed: int | None = None
+    references: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recording:
+    """Walks through a venue as surveyed: all that an estimator may ever see.
+
+    Raises
+    ------
+    DataError
+        If two walks share a name, or a reading names a beacon the venue does not have.
+    """
+
+    venue: Venue
+    walks: tuple[Walk, ...]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        if len(self.by_name) != len(self.walks):
+            raise DataError("two walks of the recording have the same name")
+        for walk in self.walks:
+            beacon = walk.observations.readings.beacon
+            if len(beacon) and not 0 <= beacon.min() <= beacon.max() < len(self.venue.beacons):
+                raise DataError(
+                    f"walk '{walk.name}': reading of beacon row {beacon.max()}, but the venue has"
+                    f" {len(self.venue.beacons)} beacons"
+                )
+
+    @cached_property
+    def by_name(self) -> MappingProxyType[str, Walk]:
+        """Walks by their names."""
+        return MappingProxyType({walk.name: walk for walk in self.walks})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Truth:
+    """What really happened: the venue as built, and each walk by its name."""
+
+    venue: Venue
+    walks: MappingProxyType[str, WalkTruth]

@@ -1,0 +1,1 @@
+"""What stands: floor plan, obstacles, line of sight, aisle graph, beacons, product sections."""
