@@ -519,3 +519,14 @@ EDGES = Stream(
     ),
 )
 STATIC = (NODES, EDGES, BEACONS, WALKS)
+RUNS = Stream(
+    name="runs",
+    group="/runs",
+    row="one estimator tried on one walk",
+    ascending=False,
+    columns=(
+        _text("estimator", "label of the estimator"),
+        _text("walk", "name of the walk"),
+        _text("failure", "why there is no track; empty where there is one"),
+    ),
+)

@@ -27,3 +27,7 @@ class ScenarioError(UsageError):
 
 class VenueError(UsageError):
     """A venue whose parts contradict each other: a beacon inside a shelf, an aisle to nowhere."""
+
+
+class ConformanceError(BlesimError):
+    """An estimator that breaks a rule of the contract; the message begins with the rule."""

@@ -1,9 +1,11 @@
 """A recording: what phones observed in a venue. Truth is another object and travels apart."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 from blesim import columns
 from blesim.errors import DataError
@@ -134,16 +136,17 @@ class Recording:
             raise DataError("two walks of the recording have the same name")
         for walk in self.walks:
             beacon = walk.observations.readings.beacon
-            if len(beacon) and not 0 <= beacon.min() <= beacon.max() < len(self.venue.beacons):
+            low, high = beacon.min(initial=0), beacon.max(initial=-1)
+            if low < 0 or high >= len(self.venue.beacons):
                 raise DataError(
-                    f"walk '{walk.name}': reading of beacon row {beacon.max()}, but the venue has"
-                    f" {len(self.venue.beacons)} beacons"
+                    f"walk '{walk.name}': reading of beacon row {low if low < 0 else high}, but"
+                    f" the venue has {len(self.venue.beacons)} beacons"
                 )
 
     @cached_property
-    def by_name(self) -> MappingProxyType[str, Walk]:
+    def by_name(self) -> Mapping[str, Walk]:
         """Walks by their names."""
-        return MappingProxyType({walk.name: walk for walk in self.walks})
+        return {walk.name: walk for walk in self.walks}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -152,3 +155,25 @@ class Truth:
 
     venue: Venue
     walks: MappingProxyType[str, WalkTruth]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle the walks as what can travel to another process."""
+        return _truth, (self.venue, dict(self.walks))
+
+
+def _truth(venue: Venue, walks: dict[str, WalkTruth]) -> Truth:
+    """Return the truth that a pickle holds."""
+    return Truth(venue=venue, walks=MappingProxyType(walks))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Failure:
+    """What stands in the place of a track whose estimator failed.
+
+    Attributes
+    ----------
+    reason : str
+        One line: what went wrong.
+    """
+
+    reason: str

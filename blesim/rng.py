@@ -41,13 +41,19 @@ _DRAWS = np.uint64(0)
 _SEQUENCE = 1
 
 _HALF_STEP = 0.5
-_STEP = 2.0**-53
+_STEP = 2.0**-52
 
 
 @cache
 def name_key(name: str) -> int:
     """The 64-bit number a name stands for in an address: BLAKE2b of its UTF-8 text, 0 for ''."""
     return int.from_bytes(blake2b(name.encode(), digest_size=8).digest(), "little") if name else 0
+
+
+def refuse_bad_seed(seed: int) -> None:
+    """Raise `UsageError` if a seed is not in [0, 2**64)."""
+    if not 0 <= seed < SEED_LIMIT:
+        raise UsageError(f"seed {seed}: give a whole number from 0 to 2**64 - 1")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,8 +81,7 @@ class Draws:
     beacon: str = ""
 
     def __post_init__(self) -> None:
-        if not 0 <= self.seed < SEED_LIMIT:
-            raise UsageError(f"seed {self.seed}: give a whole number from 0 to 2**64 - 1")
+        refuse_bad_seed(self.seed)
         if not self.purpose:
             raise ValueError("a draw needs a purpose")
 
@@ -104,9 +109,7 @@ class Draws:
 
     def normals(self, ordinals: NDArray[np.int64]) -> NDArray[np.float64]:
         """Four independent N(0, 1) numbers for each ordinal, (n, 4); see `uniforms`. [-]."""
-        out = self.uniforms(ordinals)
-        _quantiles_in_place(out.reshape(-1))
-        return out
+        return normals_of(self.uniforms(ordinals))
 
     def generator(self) -> np.random.Generator:
         """A NumPy generator for the draws of this address that are taken one after the other."""
@@ -117,6 +120,13 @@ class Draws:
                 counter=np.array([0, walker, beacon, _SEQUENCE], dtype=np.uint64),
             )
         )
+
+
+def normals_of(uniforms: NDArray[np.float64]) -> NDArray[np.float64]:
+    """N(0, 1) numbers of U(0, 1) numbers, same shape: their standard normal quantiles. [-]."""
+    out = np.array(uniforms, dtype=np.float64, order="C")
+    _quantiles_in_place(out.reshape(-1))
+    return out
 
 
 def _emit_high_word(_context: Any, _a: Any, _b: Any) -> Any:
@@ -152,8 +162,9 @@ def philox(
 
 @kernel
 def uniform(word: np.uint64) -> float:
-    """U(0, 1) from the upper 53 bits of a word, both ends excluded (kernel). [-]."""
-    return (np.float64(word >> np.uint64(11)) + _HALF_STEP) * _STEP
+    """U(0, 1) from the upper 52 bits of a word, both ends excluded (kernel). [-]."""
+    # With 53 bits the half step would be rounded away above one half, and 1 would be drawn.
+    return (np.float64(word >> np.uint64(12)) + _HALF_STEP) * _STEP
 
 
 # Coefficients of AS 241, lowest power first: numerator and denominator of each of its three ranges.

@@ -27,7 +27,8 @@ class Table:
     Raises
     ------
     DataError
-        If a column is not one-dimensional, the lengths differ, or times go backwards.
+        If a column is not one-dimensional, the lengths differ, times go backwards, or a value does
+        not fit the type of its column.
     """
 
     STREAM: ClassVar[Stream]
@@ -58,6 +59,10 @@ class Table:
         )
 
     __hash__ = None  # type: ignore[assignment]  # arrays have no hash
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle so that the columns are read-only on the other side as well."""
+        return _rebuilt, (type(self), list(self.arrays()))
 
     def arrays(self) -> Iterator[NDArray[Any]]:
         """Yield the columns in the order of the file."""
@@ -101,9 +106,27 @@ def _recorded(column: Column, values: Any) -> NDArray[Any]:
     if column.decimals is not None:
         # Adding zero turns -0.0 into 0.0, which would be another byte for the same number.
         array = np.round(array.astype(np.float64), column.decimals) + 0.0
-    recorded = array.astype(column.numpy_dtype)
+    with np.errstate(invalid="ignore"):
+        recorded = array.astype(column.numpy_dtype)
+    if column.numpy_dtype.kind in "iu" and array.dtype != recorded.dtype:
+        _refuse_changed(column, array, recorded)
     recorded.flags.writeable = False
     return recorded
+
+
+def _refuse_changed(column: Column, array: NDArray[Any], recorded: NDArray[Any]) -> None:
+    """Raise if a conversion to whole numbers cut or wrapped a value."""
+    changed = np.flatnonzero(array != recorded)
+    if len(changed):
+        raise DataError(
+            f"column {column.field}: {array[changed[0]]} in row {changed[0]} does not fit"
+            f" {column.dtype}; round it, or mend it where it comes from"
+        )
+
+
+def _rebuilt(table: type[Table], arrays: list[NDArray[Any]]) -> Table:
+    """Return a table from the columns that a pickle holds."""
+    return table._trusted(arrays)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -50,7 +50,9 @@ def wrap_angle(angle_rad: ArrayLike) -> NDArray[np.float64]:
     >>> float(wrap_angle(3 * np.pi / 2)) == -np.pi / 2
     True
     """
-    return (np.asarray(angle_rad, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi
+    wrapped = (np.asarray(angle_rad, dtype=np.float64) + np.pi) % (2.0 * np.pi) - np.pi
+    # Just below -pi the remainder rounds up to a whole turn.
+    return np.where(wrapped >= np.pi, -np.pi, wrapped)
 
 
 def heading_to_azimuth(heading_rad: ArrayLike) -> NDArray[np.float64]:

@@ -1,9 +1,8 @@
 """The floor plan: bounds of each level, obstacles with a material, where people can walk."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 
 import shapely
 from shapely import Polygon
@@ -13,6 +12,8 @@ from blesim.errors import VenueError
 from blesim.venue.materials import MATERIALS, Material
 
 FLOOR_TO_CEILING_M = float("inf")
+# What a recording can hold.
+_LEVELS = (-50, 200)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -67,7 +68,7 @@ class Level:
     Raises
     ------
     VenueError
-        If the bounds are not a valid polygon.
+        If the bounds are not a valid polygon, or the number is out of a recording's range.
     """
 
     level: int
@@ -75,6 +76,7 @@ class Level:
 
     def __post_init__(self) -> None:
         _refuse_bad_outline(f"level {self.level}", self.bounds)
+        refuse_bad_level("the floor plan", self.level)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,16 +120,14 @@ class FloorPlan:
         raise VenueError(f"{who} is on level {level}, but the floor plan has only {known}")
 
     @cached_property
-    def walkable(self) -> MappingProxyType[int, BaseGeometry]:
+    def walkable(self) -> Mapping[int, BaseGeometry]:
         """Area of each level where a person can stand: its bounds without its obstacles."""
-        return MappingProxyType(
-            {
-                level.level: shapely.difference(
-                    level.bounds, shapely.union_all(self._outlines(level.level))
-                )
-                for level in self.levels
-            }
-        )
+        return {
+            level.level: shapely.difference(
+                level.bounds, shapely.union_all(self._outlines(level.level))
+            )
+            for level in self.levels
+        }
 
     def _outlines(self, level: int) -> list[Polygon]:
         return [obstacle.outline for obstacle in self.obstacles if obstacle.level == level]
@@ -140,6 +140,12 @@ def refuse_repeated(what: str, ids: Sequence[str]) -> None:
         if name in seen:
             raise VenueError(f"{what} '{name}' is there twice; give each its own id")
         seen.add(name)
+
+
+def refuse_bad_level(who: str, level: int) -> None:
+    """Raise `VenueError` if a recording could not hold the number of a level."""
+    if not _LEVELS[0] <= level <= _LEVELS[1]:
+        raise VenueError(f"{who}: level {level} is not within {_LEVELS[0]} to {_LEVELS[1]}")
 
 
 def _refuse_bad_outline(who: str, outline: Polygon) -> None:

@@ -1,22 +1,31 @@
 """The aisle graph: where people walk, reduced from two dimensions to edge and offset."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from types import MappingProxyType
-from typing import Any
+from math import isfinite
+from typing import Any, TypeVar
 
 import networkx as nx
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from blesim.errors import VenueError
-from blesim.venue.floor_plan import refuse_repeated
+from blesim.venue.floor_plan import refuse_bad_level, refuse_repeated
+
+Array = TypeVar("Array", bound=NDArray[Any])
 
 # Two positions closer than this are the same place.
 SAME_PLACE_M = 1e-6
-_CHUNK = 65536
+# Points looked at together: few enough to stay in the cache.
+_CHUNK = 2048
+
+
+def read_only(array: Array) -> Array:
+    """The same array, protected: what a frozen value hands out must not change."""
+    array.flags.writeable = False
+    return array
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,7 +87,8 @@ class AisleGraph:
     Raises
     ------
     VenueError
-        If a node repeats, an edge names an unknown node, joins two levels, or has no length.
+        If a node repeats or is nowhere, an edge names an unknown node, joins two levels, or has no
+        length.
     """
 
     nodes: tuple[Node, ...]
@@ -88,6 +98,10 @@ class AisleGraph:
         if not self.edges:
             raise VenueError("an aisle graph needs at least one edge")
         refuse_repeated("node", [node.id for node in self.nodes])
+        for node in self.nodes:
+            refuse_bad_level(f"node '{node.id}'", node.level)
+            if not (isfinite(node.x_m) and isfinite(node.y_m)):
+                raise VenueError(f"node '{node.id}': ({node.x_m:g}, {node.y_m:g}) is no position")
         for edge in self.edges:
             self._refuse_bad_edge(edge)
 
@@ -105,38 +119,37 @@ class AisleGraph:
             raise VenueError(f"{name} has no length")
 
     @cached_property
-    def node_row(self) -> MappingProxyType[str, int]:
+    def node_row(self) -> Mapping[str, int]:
         """Row of each node by its id."""
-        return MappingProxyType({node.id: row for row, node in enumerate(self.nodes)})
+        return {node.id: row for row, node in enumerate(self.nodes)}
 
     @cached_property
     def node_xy_m(self) -> NDArray[np.float64]:
         """Positions of the nodes, (number of nodes, 2). [m]."""
-        return np.array([(node.x_m, node.y_m) for node in self.nodes], dtype=np.float64)
+        return read_only(np.array([(node.x_m, node.y_m) for node in self.nodes], np.float64))
 
     @cached_property
     def ends(self) -> NDArray[np.int64]:
         """Rows of the first and second node of each edge, (number of edges, 2)."""
         rows = [(self.node_row[edge.first], self.node_row[edge.second]) for edge in self.edges]
-        return np.array(rows, dtype=np.int64)
+        return read_only(np.array(rows, dtype=np.int64))
 
     @cached_property
     def level(self) -> NDArray[np.int16]:
         """Level of each edge, (number of edges,)."""
-        return np.array([self.nodes[row].level for row in self.ends[:, 0]], dtype=np.int16)
+        return read_only(np.array([self.nodes[row].level for row in self.ends[:, 0]], np.int16))
 
     @cached_property
     def length_m(self) -> NDArray[np.float64]:
         """Length of each edge, (number of edges,). [m]."""
         along = self.node_xy_m[self.ends[:, 1]] - self.node_xy_m[self.ends[:, 0]]
-        return np.hypot(along[:, 0], along[:, 1])
+        return read_only(np.hypot(along[:, 0], along[:, 1]))
 
     @cached_property
     def direction(self) -> NDArray[np.float64]:
         """Unit vector of each edge from first to second node, (number of edges, 2). [-]."""
         along = self.node_xy_m[self.ends[:, 1]] - self.node_xy_m[self.ends[:, 0]]
-        unit: NDArray[np.float64] = along / self.length_m[:, None]
-        return unit
+        return read_only(along / self.length_m[:, None])
 
     @cached_property
     def branches(self) -> tuple[str, ...]:
@@ -147,7 +160,7 @@ class AisleGraph:
     def branch(self) -> NDArray[np.int64]:
         """Branch of each edge as a row of `branches`, (number of edges,)."""
         row = {name: number for number, name in enumerate(self.branches)}
-        return np.array([row[edge.branch] for edge in self.edges], dtype=np.int64)
+        return read_only(np.array([row[edge.branch] for edge in self.edges], np.int64))
 
     @cached_property
     def network(self) -> "nx.MultiDiGraph[str]":
@@ -174,8 +187,7 @@ class AisleGraph:
             shortest[pair] = min(float(length_m), shortest.get(pair, np.inf))
         rows, columns = np.array(list(shortest)).T
         matrix = coo_matrix((list(shortest.values()), (rows, columns)), shape=(count, count))
-        distance: NDArray[np.float64] = dijkstra(matrix.tocsr(), directed=False)
-        return distance
+        return read_only(dijkstra(matrix.tocsr(), directed=False))
 
     def xy_m(self, edge: ArrayLike, offset_m: ArrayLike) -> NDArray[np.float64]:
         """Map position of places on the graph.
@@ -283,13 +295,13 @@ class AisleGraph:
         return self.branches_of_node[node]
 
     @cached_property
-    def branches_of_node(self) -> MappingProxyType[str, frozenset[str]]:
+    def branches_of_node(self) -> Mapping[str, frozenset[str]]:
         """Branches that meet in each node."""
         found: dict[str, set[str]] = {node.id: set() for node in self.nodes}
         for edge in self.edges:
             found[edge.first].add(edge.branch)
             found[edge.second].add(edge.branch)
-        return MappingProxyType({node: frozenset(names) for node, names in found.items()})
+        return {node: frozenset(names) for node, names in found.items()}
 
     def distance_m(
         self,

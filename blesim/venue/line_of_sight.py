@@ -3,7 +3,8 @@
 Shapely builds and checks the outlines; a compiled loop evaluates the links. The line through both
 ends of a link enters and leaves an outline an even number of times; between entry and exit it is
 inside. Clipping those intervals to the link and to the obstacle's height gives the crossed length,
-without special cases for an end that lies on an outline (a beacon on a shelf face).
+without special cases for an end that lies on an outline (a beacon on a shelf face). A link that
+runs along a face is outside; an exactly vertical link crosses nothing.
 """
 
 from collections.abc import Sequence
@@ -19,6 +20,8 @@ from blesim.venue.floor_plan import Obstacle
 
 # A shorter stretch inside an outline is a touch, not a crossing.
 TOUCH_M = 1e-6
+# A corner closer to the line than this is on it.
+_ON_LINE_M = 1e-10
 
 
 class _Walls(NamedTuple):
@@ -84,6 +87,7 @@ class LineOfSight:
         ndarray of float64, (n, number of obstacles)
             [m]
         """
+        _refuse_bad_ends(start_m, end_m)
         out = np.zeros((len(start_m), len(self.walls.height_m)))
         _fill(start_m, end_m, self.walls, self.longest_outline, out, np.empty(0))
         return out
@@ -103,9 +107,16 @@ class LineOfSight:
         ndarray of float64, (n,)
             [dB]
         """
+        _refuse_bad_ends(start_m, end_m)
         out = np.zeros(len(start_m))
         _fill(start_m, end_m, self.walls, self.longest_outline, np.empty((0, 0)), out)
         return out
+
+
+def _refuse_bad_ends(start_m: NDArray[np.float64], end_m: NDArray[np.float64]) -> None:
+    """Raise before a kernel, which checks no bounds, would read beyond an array."""
+    if start_m.shape != end_m.shape or start_m.shape[1:] != (3,):
+        raise ValueError(f"links need two (n, 3) arrays, not {start_m.shape} and {end_m.shape}")
 
 
 def _rings(obstacle: Obstacle) -> list[NDArray[np.float64]]:
@@ -155,22 +166,31 @@ def _crossings(
     opens: NDArray[np.bool_],
     first: int,
     beyond: int,
+    strict: bool,
     shares: NDArray[np.float64],
-) -> int:
-    """Sort into `shares` where the line enters and leaves, 0 at start and 1 at end (kernel)."""
-    per_square = 1.0 / (link.along_x * link.along_x + link.along_y * link.along_y)
-    count = 0
-    old_x, old_y, old_side = 0.0, 0.0, 0.0
+) -> tuple[int, bool]:
+    """Sort into `shares` where the line enters and leaves, 0 at start and 1 at end (kernel).
+
+    A corner on the line counts to its left, or to its right if `strict`. Also returned: whether
+    there is such a corner.
+    """
+    square = link.along_x * link.along_x + link.along_y * link.along_y
+    per_square, on_line = 1.0 / square, _ON_LINE_M * np.sqrt(square)
+    count, touches = 0, False
+    old_x, old_y, old_side, old_left = 0.0, 0.0, 0.0, False
     for row in range(first, beyond):
         x, y = corners[row, 0] - link.x, corners[row, 1] - link.y
         side = link.along_x * y - link.along_y * x
-        if not opens[row] and (side >= 0.0) != (old_side >= 0.0):
+        if abs(side) <= on_line:
+            side, touches = 0.0, True
+        left = side > 0.0 or (side == 0.0 and not strict)
+        if not opens[row] and left != old_left:
             part = old_side / (old_side - side)
             cut_x, cut_y = old_x + part * (x - old_x), old_y + part * (y - old_y)
             _insert(shares, count, (cut_x * link.along_x + cut_y * link.along_y) * per_square)
             count += 1
-        old_x, old_y, old_side = x, y, side
-    return count
+        old_x, old_y, old_side, old_left = x, y, side, left
+    return count, touches
 
 
 @kernel
@@ -181,6 +201,25 @@ def _insert(shares: NDArray[np.float64], count: int, share: float) -> None:
         shares[place] = shares[place - 1]
         place -= 1
     shares[place] = share
+
+
+@kernel
+def _overlap(
+    a: NDArray[np.float64],
+    count_a: int,
+    b: NDArray[np.float64],
+    count_b: int,
+    both: NDArray[np.float64],
+) -> int:
+    """Put into `both` the entries and exits of what lies in the intervals of a and b (kernel)."""
+    count = 0
+    for i in range(0, count_a, 2):
+        for j in range(0, count_b, 2):
+            enter, leave = max(a[i], b[j]), min(a[i + 1], b[j + 1])
+            if leave > enter:
+                both[count], both[count + 1] = enter, leave
+                count += 2
+    return count
 
 
 @kernel
@@ -222,15 +261,22 @@ def _fill(
     # Taken out of the tuple once: in the loop each access would count references.
     corners, opens, first, box = walls.corners, walls.opens, walls.first, walls.box
     height, crossing_db, metre_db = walls.height_m, walls.crossing_db, walls.metre_db
-    shares = np.empty(longest_outline)
+    shares, strict = np.empty(longest_outline), np.empty(longest_outline)
+    both = np.empty(2 * longest_outline)
     for row in range(len(start)):
         link = _link(start, end, row)
         for k in range(len(height)):
             if _misses_box(link, box[k, 0], box[k, 1], box[k, 2], box[k, 3]):
                 continue
             low, high = _below(link, height[k])
-            count = _crossings(link, corners, opens, first[k], first[k + 1], shares)
+            begin, beyond = first[k], first[k + 1]
+            count, touches = _crossings(link, corners, opens, begin, beyond, False, shares)
             length, crossings = _inside(link, shares, count, low, high)
+            if touches:
+                # Inside is what is inside on both sides of a line that runs along a face.
+                other, _ = _crossings(link, corners, opens, begin, beyond, True, strict)
+                count = _overlap(shares, count, strict, other, both)
+                length, crossings = _inside(link, both, count, low, high)
             if len(lengths):
                 lengths[row, k] = length
             if len(losses):
