@@ -1,0 +1,1 @@
+"""What the phone feels while it is carried."""

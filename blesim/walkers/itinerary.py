@@ -1,0 +1,78 @@
+"""What a walker has been told to do: where to go, how fast, where to stand, where to press."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blesim.errors import UsageError
+from blesim.venue.graph import GraphPosition
+from blesim.venue.venue import Venue
+
+_FASTEST_M_S = 10.0
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Stop:
+    """A place of the route, and how long to stand there. [s]."""
+
+    place: GraphPosition
+    pause_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.pause_s < float("inf"):
+            raise UsageError(f"pause_s {self.pause_s}: a pause cannot be negative or endless")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Itinerary:
+    """A scripted walk at a steady pace.
+
+    Attributes
+    ----------
+    walker : str
+        Who walks; names the walker's random numbers.
+    stops : tuple of Stop
+        Two or more, in order; the shortest way is taken between them.
+    start_s : float
+        When the walk begins, on the clock of the simulation. [s]
+    speed_m_s : float
+        Pace. [m/s]
+    turn_rate_rad_s : float
+        How fast the walker turns on the spot where the way bends. [rad/s]
+    marks_m : ndarray of float64, (n, 2)
+        Way points at whose passing the tester presses, on the graph. [m]
+    """
+
+    walker: str
+    stops: tuple[Stop, ...]
+    start_s: float = 0.0
+    speed_m_s: float = 1.0
+    turn_rate_rad_s: float = np.pi
+    marks_m: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+
+    def __post_init__(self) -> None:
+        if len(self.stops) < 2:
+            raise UsageError(f"walker '{self.walker}': a route needs at least two stops")
+        if not 0.0 < self.speed_m_s <= _FASTEST_M_S:
+            raise UsageError(f"walker '{self.walker}': speed_m_s must be above 0, up to 10")
+        if not self.turn_rate_rad_s > 0.0:
+            raise UsageError(f"walker '{self.walker}': turn_rate_rad_s must be positive")
+        self.marks_m.flags.writeable = False
+
+
+def way_points_m(venue: Venue) -> NDArray[np.float64]:
+    """Places that a tester can tell by sight: ends of product sections and junctions.
+
+    Returns
+    -------
+    ndarray of float64, (n, 2)
+        Each once. [m]
+    """
+    ends = [end for section in venue.sections for end in (section.start_m, section.end_m)]
+    if venue.graph is not None:
+        branches = venue.graph.branches_of_node
+        ends += [(n.x_m, n.y_m) for n in venue.graph.nodes if len(branches[n.id]) > 1]
+    if not ends:
+        return np.empty((0, 2))
+    return np.unique(np.round(np.array(ends, dtype=np.float64), 6), axis=0)
