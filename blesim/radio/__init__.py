@@ -1,0 +1,1 @@
+"""What the phone hears: from the advertising event to the reading an application gets."""
