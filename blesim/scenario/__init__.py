@@ -1,0 +1,1 @@
+"""The frozen sum of all parameters of a simulation, read from YAML."""
