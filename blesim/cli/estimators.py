@@ -1,0 +1,32 @@
+"""`blesim estimators`: which estimators are installed, what they need, what can be set."""
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from blesim.cli.console import answer_json, answer_table
+
+
+def estimators(
+    as_json: Annotated[bool, typer.Option("--json", help="Print a JSON list.")] = False,
+) -> None:
+    """List the installed estimators with what they need and what can be set."""
+    from blesim.estimators.registry import describe, estimator_names
+
+    described = [describe(name) for name in estimator_names()]
+    if as_json:
+        answer_json([asdict(each) for each in described])
+        return
+    answer_table(
+        "Estimators",
+        ("name", "needs", "parameters"),
+        [
+            (
+                each.name,
+                each.fault or ", ".join(each.needs) or "RSSI readings alone",
+                "\n".join(f"{p.name}={p.default}  ({p.type})" for p in each.parameters),
+            )
+            for each in described
+        ],
+    )

@@ -1,0 +1,170 @@
+"""The picture of a scored recording: tracks over the floor plan, error distributions beside it."""
+
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+from shapely import get_coordinates
+
+from blesim.errors import UsageError
+from blesim.tables import Track, Trajectory
+from blesim.venue.venue import Venue
+
+# Told apart by people with any colour vision: Okabe and Ito, "Color universal design", 2008.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_SHELF = "#c9c4bb"
+_FLOOR = "#f7f5f1"
+_TRUTH = "#222222"
+_ERROR_SHARE = 0.99
+
+
+def draw_tracks(
+    venue: Venue,
+    walk: str,
+    trajectory: Trajectory,
+    tracks: Mapping[str, Track],
+    errors_m: Mapping[str, NDArray[np.float64]],
+) -> Figure:
+    """A figure of one walk over the floor plan, and the error distribution of each estimator.
+
+    Parameters
+    ----------
+    venue : Venue
+        As built.
+    walk : str
+        Name of the walk that is drawn.
+    trajectory : Trajectory
+        Its truth.
+    tracks : mapping of str to Track
+        Estimates of that walk by estimator.
+    errors_m : mapping of str to ndarray of float64, (n,)
+        Position errors over all walks by estimator. [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    west, south, east, north = venue.floor_plan.levels[0].bounds.bounds
+    map_width = float(np.clip(4.6 * (east - west) / (north - south), 5.0, 11.0))
+    figure = Figure(figsize=(map_width + 4.6, 5.2), layout="constrained")
+    plan, distribution = figure.subplots(1, 2, width_ratios=(map_width, 4.4))
+    _draw_venue(plan, venue)
+    _draw_walk(plan, trajectory, tracks, shelves=bool(venue.floor_plan.obstacles))
+    plan.set_title(f"{venue.name}: {walk}", loc="left")
+    _draw_errors(distribution, errors_m)
+    return figure
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure, whole or not at all; the same figure gives the same bytes.
+
+    Raises
+    ------
+    UsageError
+        If the name ends in no format that can be drawn, or nothing can be written there.
+    """
+    known = figure.canvas.get_supported_filetypes()
+    kind = path.suffix.removeprefix(".")
+    if kind not in known:
+        raise UsageError(f"{path}: a figure cannot be written as '{kind}'; use .png, .svg or .pdf")
+    drawn = BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "blesim"}):
+        figure.savefig(drawn, format=kind, dpi=120, metadata=_no_date(path))
+    part = path.with_name(f".{path.name}.part")
+    try:
+        part.write_bytes(drawn.getvalue())
+        part.replace(path)
+    except OSError as fault:
+        raise UsageError(f"{path}: cannot be written: {fault.strerror}") from fault
+
+
+def _no_date(path: Path) -> dict[str, Any]:
+    dated = {".svg": "Date", ".pdf": "CreationDate"}
+    return {dated[path.suffix]: None} if path.suffix in dated else {}
+
+
+def _draw_venue(axes: Axes, venue: Venue) -> None:
+    level = venue.floor_plan.levels[0]
+    axes.fill(
+        *get_coordinates(level.bounds).T, facecolor=_FLOOR, edgecolor="#999999", linewidth=0.8
+    )
+    for obstacle in venue.floor_plan.obstacles:
+        if obstacle.level == level.level:
+            axes.fill(*get_coordinates(obstacle.outline.exterior).T, facecolor=_SHELF)
+    x_m, y_m, _ = venue.beacon_xyz_m.T
+    axes.scatter(x_m, y_m, s=22, marker="^", color=COLOURS[2], zorder=4, linewidths=0)
+    if len(venue.beacons) <= 40:
+        for beacon in venue.beacons:
+            axes.annotate(
+                beacon.id,
+                (beacon.x_m, beacon.y_m),
+                xytext=(0, 4),
+                textcoords="offset points",
+                ha="center",
+                fontsize=6.5,
+                color="#444444",
+            )
+    axes.set_aspect("equal")
+    axes.set_xlabel("x [m]")
+    axes.set_ylabel("y [m]")
+    axes.spines[["top", "right"]].set_visible(False)
+
+
+def _draw_walk(
+    axes: Axes, trajectory: Trajectory, tracks: Mapping[str, Track], *, shelves: bool
+) -> None:
+    axes.plot(trajectory.x_m, trajectory.y_m, color=_TRUTH, linewidth=2.2, zorder=3)
+    axes.plot(trajectory.x_m[0], trajectory.y_m[0], "o", color=_TRUTH, markersize=7, zorder=6)
+    labels = [
+        *([Patch(facecolor=_SHELF, label="shelf")] if shelves else []),
+        *axes.plot([], [], "^", color=COLOURS[2], linestyle="none", label="beacon"),
+        *axes.plot([], [], "o-", color=_TRUTH, linewidth=2.2, label="true track, dot at the start"),
+    ]
+    for colour, (label, track) in zip(_cycle(len(tracks)), tracks.items(), strict=True):
+        poses = trajectory.at(track.time_us)
+        estimates = np.stack([track.x_m, track.y_m], axis=1)
+        ends = np.stack([np.stack([poses.x_m, poses.y_m], axis=1), estimates], axis=1)
+        axes.add_collection(LineCollection(list(ends), colors=colour, linewidths=0.4, alpha=0.35))
+        labels += axes.plot(
+            *estimates.T, ".", markersize=6, color=colour, zorder=5, label=f"estimates: {label}"
+        )
+    axes.legend(
+        handles=labels,
+        loc="upper center",
+        bbox_to_anchor=(0.5, -0.16),
+        ncols=2 if len(labels) > 3 else 3,
+        frameon=False,
+        fontsize=9,
+    )
+
+
+def _draw_errors(axes: Axes, errors_m: Mapping[str, NDArray[np.float64]]) -> None:
+    widest_m = 1.0
+    for colour, (label, errors) in zip(_cycle(len(errors_m)), errors_m.items(), strict=True):
+        ordered = np.sort(errors)
+        share = np.arange(1, len(ordered) + 1) / max(len(ordered), 1)
+        axes.step(ordered, share, where="post", color=colour, linewidth=1.8, label=label)
+        if len(ordered):
+            widest_m = max(widest_m, float(np.quantile(ordered, _ERROR_SHARE)))
+    for level, name in ((0.5, "50 %"), (0.9, "90 %")):
+        axes.axhline(level, color="#bbbbbb", linewidth=0.8, linestyle=":")
+        axes.annotate(name, (widest_m, level), ha="right", va="bottom", fontsize=8, color="#777777")
+    axes.set_xlim(0, widest_m)
+    axes.set_ylim(0, 1.005)
+    axes.set_xlabel("position error [m]")
+    axes.set_ylabel("share of readings with a smaller error [-]")
+    axes.set_title("all walks", loc="left")
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.legend(loc="lower right", frameon=False, fontsize=9)
+
+
+def _cycle(count: int) -> list[str]:
+    return [COLOURS[number % len(COLOURS)] for number in range(count)]
