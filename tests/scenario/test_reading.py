@@ -1,0 +1,183 @@
+import contextlib
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from blesim.errors import ScenarioError
+from blesim.scenario.build import set_stage
+from blesim.scenario.reading import read_scenario
+
+GOOD = """\
+title: Ten lines
+seed: 1
+venue: {layout: wholesale-section}
+phones:
+  phone: {}
+walks:
+  - name: run
+    phone: phone
+    speed_m_s: 1.2
+    route: [D1, D5, {x_m: 30.0, y_m: 8.2, pause_s: 5}]
+"""
+
+
+@pytest.fixture
+def scenario(tmp_path):
+    def write(text: str):
+        path = tmp_path / "scenario.yaml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return write
+
+
+def faults(path) -> list[str]:
+    """The lines of the error, without the folder."""
+    with pytest.raises(ScenarioError) as caught:
+        set_stage(read_scenario(path), 1)
+    assert caught.value.exit_code == 2
+    return [line.replace(f"{path.parent}/", "") for line in str(caught.value).splitlines()]
+
+
+def test_a_good_scenario_reads_and_keeps_its_text(scenario):
+    file = read_scenario(scenario(GOOD))
+    assert file.text == GOOD
+    assert file.scenario.walks[0].route[0].node == "D1"
+    assert file.scenario.walks[0].route[2].pause_s == 5
+    stage = set_stage(file, 1)
+    assert len(stage.built.beacons) == 25
+    assert stage.built == stage.surveyed
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ("seed: 1", "sed: 1", "scenario.yaml:2: sed: unknown key"),
+        ("seed: 1", "seed: -1", "scenario.yaml:2: seed: "),
+        ("seed: 1", "seed: '1'", "scenario.yaml:2: seed: "),
+        ("speed_m_s: 1.2", "speed_m_s: fast", "scenario.yaml:9: walks.0.speed_m_s: "),
+        ("speed_m_s: 1.2", "speed_m_s: .nan", "scenario.yaml:9: walks.0.speed_m_s: "),
+        ("speed_m_s: 1.2", "speed_m_s: .inf", "scenario.yaml:9: walks.0.speed_m_s: "),
+        ("speed_m_s: 1.2", "speed_m_s: 0", "scenario.yaml:9: walks.0.speed_m_s: "),
+        ("speed_m_s: 1.2", "speed_m_s: true", "scenario.yaml:9: walks.0.speed_m_s: "),
+        ("    phone: phone\n", "", "scenario.yaml:7: walks.0.phone: missing"),
+        ("phone: phone", "phone: tablet", "scenario.yaml:8: walks.0.phone: unknown phone 'tablet'"),
+        ("D1, D5", "D1, Z9", "scenario.yaml:10: walks.0.route.1: there is no node 'Z9'"),
+        ("x_m: 30.0, ", "", "scenario.yaml:10: walks.0.route.2: give either 'node' or both"),
+        ("y_m: 8.2", "y_m: 11.0", "scenario.yaml:10: walks.0.route.2: (30, 11) is 2.50 m off"),
+        ("pause_s: 5", "pause_s: -5", "scenario.yaml:10: walks.0.route.2.pause_s: "),
+        ("phone: {}", "phone: {height_m: 9}", "scenario.yaml:5: phones.phone.height_m: "),
+        ("layout: wholesale-section", "layout: palace", "scenario.yaml:3: venue.layout: "),
+        ("{layout: wholesale-section}", "{}", "scenario.yaml:3: venue: give either 'map'"),
+        ("layout: wholesale-section", "map: no.geojson", "scenario.yaml:3: venue.map: no.geojson:"),
+        ("title: Ten lines\n", "", "scenario.yaml:1: title: missing"),
+        ("seed: 1", "seed: 1\nseed: 2", "scenario.yaml:3: not valid YAML: "),
+        ("seed: 1", "seed: [1", "scenario.yaml:3: not valid YAML: "),
+    ],
+)
+def test_a_fault_is_told_with_its_line(scenario, old, new, expected):
+    assert old in GOOD
+    (line,) = faults(scenario(GOOD.replace(old, new)))
+    assert line.startswith(expected)
+
+
+def test_all_faults_are_told_at_once(scenario):
+    text = GOOD.replace("seed: 1", "colour: red").replace("1.2", "-1").replace("pause_s", "pose_s")
+    lines = faults(scenario(text))
+    assert [re.match(r"scenario.yaml:(\d+): (\S+):", line).groups() for line in lines] == [
+        ("9", "walks.0.speed_m_s"),
+        ("10", "walks.0.route.2.pose_s"),
+        ("2", "colour"),
+    ]
+
+
+def test_all_faults_of_the_second_look_are_told_at_once(scenario):
+    text = GOOD.replace("D1, D5", "Y1, Z9").replace("phone: phone", "phone: tablet")
+    assert [line.split(": ")[1] for line in faults(scenario(text))] == [
+        "walks.0.phone",
+        "walks.0.route.0",
+        "walks.0.route.1",
+    ]
+
+
+def test_two_walks_of_one_name_are_refused(scenario):
+    second = "  - {name: run, phone: phone, route: [D1, D2]}\n"
+    (line,) = faults(scenario(GOOD + second))
+    assert line.startswith("scenario.yaml:11: walks.1.name: walk 'run' is there twice")
+
+
+@pytest.mark.parametrize("text", ["", "just words", "- a\n- b\n", "null"])
+def test_what_is_no_mapping_is_refused(scenario, text):
+    (line,) = faults(scenario(text))
+    assert line.startswith("scenario.yaml:1: a scenario is a mapping")
+
+
+def test_a_missing_file_and_bad_bytes_are_refused(tmp_path):
+    with pytest.raises(ScenarioError, match=r"nowhere\.yaml: No such file"):
+        read_scenario(tmp_path / "nowhere.yaml")
+    bad = tmp_path / "bad.yaml"
+    bad.write_bytes(b"title: \xff\xfe")
+    with pytest.raises(ScenarioError, match="not UTF-8 text at byte 7"):
+        read_scenario(bad)
+
+
+def test_a_route_that_does_not_connect_is_refused_at_its_stop(scenario, tmp_path, section):
+    from blesim.venue.geojson import to_geojson
+
+    text = to_geojson(section)
+    lines = [line for line in text.splitlines(keepends=True) if '"branch": "east"' not in line]
+    cut = "".join(line for line in lines if '"branch": "west"' not in line)
+    (tmp_path / "cut.geojson").write_text(cut, encoding="utf-8")
+    (line,) = faults(scenario(GOOD.replace("layout: wholesale-section", "map: cut.geojson")))
+    assert line.startswith("scenario.yaml:10: walks.0.route.2: no way leads from node 'D5' to")
+
+
+def test_a_map_with_a_beacon_inside_a_shelf_is_refused(scenario, tmp_path, section):
+    from blesim.venue.geojson import to_geojson
+
+    text = to_geojson(section).replace("[3.8, 15.4, 2.0]", "[3.9, 15.6, 2.0]")
+    (tmp_path / "map.geojson").write_text(text, encoding="utf-8")
+    lines = faults(scenario(GOOD.replace("layout: wholesale-section", "map: map.geojson")))
+    assert len(lines) == 1
+    assert lines[0].startswith("scenario.yaml:3: venue.map: map.geojson: ")
+    assert "beacon 'D1'" in lines[0]
+    assert "inside obstacle 'D/wall-1'" in lines[0]
+
+
+def test_surveying_errors_move_what_estimators_know_not_what_is_built(scenario):
+    text = GOOD.replace(
+        "{layout: wholesale-section}", "{layout: wholesale-section, survey_error_m: 1}"
+    )
+    stages = [set_stage(read_scenario(scenario(text)), seed) for seed in range(40)]
+    assert len({stage.built.beacon_xyz_m.tobytes() for stage in stages}) == 1
+    errors = [s.surveyed.beacon_xyz_m - s.built.beacon_xyz_m for s in stages]
+    # Nobody writes a beacon down inside a shelf, so the spread is somewhat below one metre.
+    x_m = [error[:, 0] for error in errors]
+    assert 0.8 < float(abs(sum(e.std() for e in x_m) / len(x_m))) < 1.05
+    assert all((error[:, 2] == 0).all() for error in errors)
+
+
+@given(text=st.text(max_size=200) | st.binary(max_size=200).map(lambda b: b.decode("latin-1")))
+def test_no_text_makes_anything_but_a_scenario_error(tmp_path_factory, text):
+    path = tmp_path_factory.mktemp("any") / "scenario.yaml"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ScenarioError):
+        read_scenario(path)
+
+
+@given(
+    line=st.integers(0, len(GOOD.splitlines()) - 1),
+    value=st.sampled_from(
+        ["", "null", "[]", "{}", "-1", "1e400", "~", "'", "&a *a", "!!python/x 1"]
+    ),
+)
+def test_a_spoiled_line_never_escapes_as_anything_else(tmp_path_factory, line, value):
+    lines = GOOD.splitlines()
+    key = lines[line].partition(":")[0]
+    lines[line] = f"{key}: {value}"
+    path = tmp_path_factory.mktemp("spoiled") / "scenario.yaml"
+    path.write_text("\n".join(lines), encoding="utf-8")
+    with contextlib.suppress(ScenarioError):
+        set_stage(read_scenario(path), 1)

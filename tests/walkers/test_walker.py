@@ -1,0 +1,140 @@
+import numpy as np
+import pytest
+
+from blesim.errors import UsageError, VenueError
+from blesim.venue.graph import AisleGraph, Edge, GraphPosition, Node
+from blesim.walkers.itinerary import Itinerary, Stop, way_points_m
+from blesim.walkers.walker import simulate_walkers
+
+# Two aisles of 10 m that meet at a right angle in B; C - D cannot be reached, D - A is one-way.
+NODES = {"A": (0, 0), "B": (10, 0), "C": (10, 10), "D": (0, 10), "E": (50, 50), "F": (60, 50)}
+GRAPH = AisleGraph(
+    nodes=tuple(Node(id=name, x_m=x, y_m=y) for name, (x, y) in NODES.items()),
+    edges=(
+        Edge(first="A", second="B", branch="south"),
+        Edge(first="B", second="C", branch="east"),
+        Edge(first="D", second="A", branch="west", one_way=True),
+        Edge(first="D", second="C", branch="north"),
+        Edge(first="E", second="F", branch="island"),
+    ),
+)
+
+
+def stops(*names: str, pause_s: float = 0.0) -> tuple[Stop, ...]:
+    return tuple(Stop(place=GRAPH.at_node(name), pause_s=pause_s) for name in names)
+
+
+def walked(**settings):
+    itinerary = Itinerary(**{"walker": "w", "stops": stops("A", "C"), **settings})
+    (log,) = simulate_walkers(GRAPH, (itinerary,))
+    return log.trajectory(), log.pressed()
+
+
+def test_story_of_a_walk_round_a_corner():
+    trajectory, _ = walked(start_s=5.0, speed_m_s=2.0, turn_rate_rad_s=np.pi / 2)
+    # 10 m at 2 m/s, a quarter turn in one second, 10 m at 2 m/s.
+    assert trajectory.time_us.tolist() == [5_000_000, 10_000_000, 11_000_000, 16_000_000]
+    assert trajectory.state.tolist() == [1, 2, 1, 0]
+    assert trajectory.x_m.tolist() == [0, 10, 10, 10]
+    assert trajectory.y_m.tolist() == [0, 0, 0, 10]
+    assert trajectory.speed_m_s.tolist() == [2, 0, 2, 0]
+    assert trajectory.edge.tolist() == [0, 1, 1, 1]
+    assert trajectory.offset_m.tolist() == [0, 0, 0, 10]
+    assert trajectory.heading_rad == pytest.approx([0, 0, np.pi / 2, np.pi / 2], abs=1e-6)
+    middle = trajectory.at(np.array([10_500_000, 12_000_000]))
+    assert middle.heading_rad == pytest.approx([np.pi / 4, np.pi / 2], abs=1e-6)
+    assert middle.offset_m == pytest.approx([0, 2], abs=1e-6)
+    assert middle.y_m == pytest.approx([0, 2], abs=1e-6)
+
+
+def test_pauses_take_their_time_and_hold_the_place():
+    trajectory, _ = walked(stops=stops("A", "B", "C", pause_s=3.0), speed_m_s=1.0)
+    moving = 20.0 + 0.5
+    assert (trajectory.time_us[-1] - trajectory.time_us[0]) / 1e6 == pytest.approx(moving + 9.0)
+    standing = trajectory.at(np.array([1_500_000, 14_000_000, 15_900_000]))
+    assert standing.state.tolist() == [0, 0, 0]
+    assert standing.x_m.tolist() == [0, 10, 10]
+
+
+def test_walked_length_is_the_length_of_the_route():
+    trajectory, _ = walked(stops=stops("A", "C", "D", "B"), speed_m_s=1.37)
+    walked_m = np.hypot(np.diff(trajectory.x_m), np.diff(trajectory.y_m)).sum()
+    # A-B-C, C-D, then D-A-B is as long as D-C-B.
+    assert walked_m == pytest.approx(20 + 10 + 20)
+
+
+def test_walking_against_a_one_way_aisle_goes_round():
+    trajectory, _ = walked(stops=stops("A", "D"))
+    assert trajectory.edge.tolist()[0] == 0
+    walked_m = np.hypot(np.diff(trajectory.x_m), np.diff(trajectory.y_m)).sum()
+    assert walked_m == pytest.approx(30)
+
+
+def test_offset_falls_when_an_edge_is_walked_backwards():
+    trajectory, _ = walked(stops=stops("B", "A"), speed_m_s=1.0)
+    assert trajectory.at(np.array([4_000_000])).offset_m == pytest.approx([6.0])
+
+
+def test_turning_round_takes_half_a_turn():
+    trajectory, _ = walked(stops=stops("A", "B", "A"), speed_m_s=1.0, turn_rate_rad_s=np.pi)
+    assert trajectory.time_us[-1] == 10_000_000 + 1_000_000 + 10_000_000
+
+
+def test_marks_are_pressed_where_and_when_a_way_point_is_passed():
+    way_points = np.array([[0.0, 0.0], [2.5, 0.0], [10.0, 0.0], [10.0, 4.0], [5.0, 5.0]])
+    _, marks = walked(speed_m_s=1.0, turn_rate_rad_s=np.pi / 2, marks_m=way_points)
+    assert marks.time_us.tolist() == [0, 2_500_000, 10_000_000, 15_000_000]
+    assert marks.x_m.tolist() == [0, 2.5, 10, 10]
+    assert marks.y_m.tolist() == [0, 0, 0, 4]
+
+
+def test_a_way_point_at_a_node_is_pressed_once_each_time_it_is_passed():
+    _, marks = walked(stops=stops("A", "B", "A"), speed_m_s=1.0, marks_m=np.array([[10.0, 0.0]]))
+    assert marks.time_us.tolist() == [10_000_000]
+
+
+def test_walkers_share_a_clock_and_do_not_disturb_each_other():
+    one = Itinerary(walker="one", stops=stops("A", "B"))
+    two = Itinerary(walker="two", stops=stops("C", "A"), start_s=3.0, speed_m_s=0.7)
+    alone = [simulate_walkers(GRAPH, (each,))[0].trajectory() for each in (one, two)]
+    together = [log.trajectory() for log in simulate_walkers(GRAPH, (one, two))]
+    assert alone == together
+
+
+def test_a_stop_within_an_edge():
+    route = (Stop(place=GraphPosition(0, 2.0)), Stop(place=GraphPosition(0, 7.5)))
+    trajectory, _ = walked(stops=route, speed_m_s=1.0)
+    assert trajectory.x_m.tolist() == [2.0, 7.5]
+    assert trajectory.time_us[-1] == 5_500_000
+
+
+def test_a_route_that_does_not_connect_is_refused():
+    with pytest.raises(VenueError, match="no way leads from node 'A' to node 'E'"):
+        walked(stops=stops("A", "E"))
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"speed_m_s": 0.0},
+        {"speed_m_s": -1.0},
+        {"speed_m_s": float("nan")},
+        {"turn_rate_rad_s": 0.0},
+        {"stops": stops("A")},
+    ],
+)
+def test_impossible_itineraries_are_refused(settings):
+    with pytest.raises(UsageError, match="walker 'w'"):
+        walked(**settings)
+
+
+@pytest.mark.parametrize("pause_s", [-1.0, float("inf"), float("nan")])
+def test_impossible_pauses_are_refused(pause_s):
+    with pytest.raises(UsageError, match="pause"):
+        Stop(place=GraphPosition(0, 0.0), pause_s=pause_s)
+
+
+def test_way_points_of_the_section_are_shelf_ends_and_junctions(section):
+    points = way_points_m(section)
+    # Nineteen shelf ends in each of three aisles, and two junctions each.
+    assert len(points) == 3 * 19 + 3 * 2
