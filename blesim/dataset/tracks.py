@@ -60,7 +60,7 @@ def write_tracks(path: Path, tracks: TrackSet) -> None:
     """
     results = list(tracks.runs.values())
     found = [result if isinstance(result, Track) else Track.empty() for result in results]
-    failures = [result.reason if isinstance(result, Failure) else "" for result in results]
+    failures = [_reason(result) if isinstance(result, Failure) else "" for result in results]
     texts = ("estimated tracks", tracks.recording_sha256, packages())
     with created(path) as file, written(path):
         write_root(file, TRACKS, dict(zip(_ROOT, texts, strict=True)))
@@ -71,6 +71,11 @@ def write_tracks(path: Path, tracks: TrackSet) -> None:
         for track in found:
             sink.append(track)
         sink.finish()
+
+
+def _reason(failure: Failure) -> str:
+    # Empty text means success in the file.
+    return failure.reason or "no reason given"
 
 
 def read_tracks(path: Path) -> TrackSet:

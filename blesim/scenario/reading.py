@@ -40,6 +40,23 @@ class ScenarioFile:
     def _tree(self) -> Any:
         return _parse(self.path, self.text)
 
+    def with_parameters(self, **changes: Any) -> "ScenarioFile":
+        """The same scenario with other parameters, for what-if questions in Python.
+
+        Its text says what differs, so that a recording made from it does not pass for the original.
+
+        Parameters
+        ----------
+        **changes
+            Fields of `Scenario`, already built, such as ``radio=Propagation(...)``.
+        """
+        scenario = self.scenario.model_copy(update=changes)
+        # Validated once more: copies are not.
+        scenario = Scenario.model_validate_json(scenario.model_dump_json(exclude_unset=True))
+        differs = json.dumps(scenario.model_dump(mode="json", include=set(changes)))
+        note = f"# changed from {self.path.name}: {differs}\n"
+        return ScenarioFile(path=self.path, text=self.text + note, scenario=scenario)
+
     def fault(self, location: Location, message: str) -> str:
         """One line, ``file:line: path: message``, for a fault found after reading."""
         return _fault(self.path, self._tree, location, message)

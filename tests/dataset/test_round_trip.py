@@ -165,7 +165,7 @@ def walks(draw: st.DrawFn) -> tuple[Walk, WalkTruth]:
 
 @given(found=st.lists(walks(), max_size=3, unique_by=lambda pair: pair[0].name))
 @settings(
-    max_examples=30,
+    max_examples=15,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],

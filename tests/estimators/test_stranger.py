@@ -1,7 +1,8 @@
-"""A package of somebody else's is installed, and its estimator found and run by its name."""
+"""The README's estimator is installed as somebody else's package, found by name and run."""
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -19,23 +20,33 @@ from blesim.estimators.registry import describe, estimator_names, make_estimator
 from blesim.estimators.run import run
 
 recording = practice_recording()
-label, estimator = make_estimator("weighted-place:scale_db=10")
+label, estimator = make_estimator("weighted-centroid:memory=0.9")
 check_estimator(estimator)
 track = run(estimator, recording, recording.by_name["there"], seed=1, label=label)
 print(json.dumps({
     "names": estimator_names(),
     "rows": len(track),
-    "defaults": {p.name: p.default for p in describe("weighted-place").parameters},
+    "defaults": {p.name: p.default for p in describe("weighted-centroid").parameters},
     "fault": describe("broken-stranger").fault,
     "ours": describe("nearest-beacon").fault,
 }))
 """
 
 
+def readme_block(words):
+    """The fenced block of the README that contains the words."""
+    text = (HERE.parents[1] / "README.md").read_text(encoding="utf-8")
+    (block,) = [b for b in re.findall(r"^```\w+\n(.*?)^```", text, re.S | re.M) if words in b]
+    return block
+
+
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stranger")
     source = shutil.copytree(HERE / "stranger", folder / "source")
+    (source / "my_estimator.py").write_text(
+        readme_block("class WeightedCentroid"), encoding="utf-8"
+    )
     options = ["--quiet", "--no-index", "--no-build-isolation", "--no-deps"]
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", *options]
     subprocess.run([*pip, "--target", str(folder / "site"), str(source)], check=True)
@@ -51,8 +62,19 @@ def test_the_estimator_of_another_package_is_found_checked_and_run(installed):
         text=True,
     )
     said = json.loads(answer.stdout)
-    assert {"nearest-beacon", "weighted-place"} <= set(said["names"])
+    assert {"nearest-beacon", "weighted-centroid"} <= set(said["names"])
     assert said["rows"] > 100
-    assert said["defaults"] == {"scale_db": "20.0", "memory": "0.9"}
+    assert said["defaults"] == {"memory": "0.98"}
     assert "NotThere" in said["fault"]
     assert said["ours"] is None
+
+
+def test_the_readme_declares_it_as_the_package_does(installed):
+    declared = readme_block("[project.entry-points")
+    assert declared in (HERE / "stranger" / "pyproject.toml").read_text(encoding="utf-8")
+    assert (installed / "my_estimator.py").is_file()
+
+
+def test_it_takes_thirty_lines_or_so():
+    code = [line for line in readme_block("class WeightedCentroid").splitlines() if line.strip()]
+    assert len(code) <= 32

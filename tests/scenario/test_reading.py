@@ -6,6 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from blesim.errors import ScenarioError
+from blesim.radio.air import Propagation
 from blesim.scenario.build import set_stage
 from blesim.scenario.reading import read_scenario
 
@@ -49,6 +50,17 @@ def test_a_good_scenario_reads_and_keeps_its_text(scenario):
     stage = set_stage(file, 1)
     assert len(stage.built.beacons) == 25
     assert stage.built == stage.surveyed
+
+
+def test_changed_parameters_are_checked_and_told_in_the_text(scenario):
+    file = read_scenario(scenario(GOOD))
+    changed = file.with_parameters(radio=Propagation(path_loss_exponent=3.0))
+    assert changed.scenario.radio.path_loss_exponent == 3.0
+    assert changed.scenario.walks == file.scenario.walks
+    assert changed.text.startswith(GOOD)
+    assert "path_loss_exponent" in changed.text.removeprefix(GOOD)
+    with pytest.raises(ValueError, match="seed"):
+        file.with_parameters(seed=-1)
 
 
 @pytest.mark.parametrize(

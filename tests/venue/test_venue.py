@@ -168,11 +168,15 @@ def test_names_stand_once(kind: str) -> None:
 
 
 def test_beacons_as_arrays() -> None:
-    hall = venue(beacons=(beacon(10, 4), beacon(2, 5, id="b2", level=1, z_m=3.0)))
+    hall = venue(beacons=(beacon(10, 4), beacon(2, 5, id="b2", z_m=3.0, level=1)))
     assert hall.beacon_xyz_m.tolist() == [[10.0, 4.0, 1.5], [2.0, 5.0, 3.0]]
     assert hall.beacon_level.tolist() == [0, 1]
     assert venue().beacon_xyz_m.shape == (0, 3)
-    for array in (hall.beacon_xyz_m, hall.beacon_level, *hall.beacon_places):
+    for array in (
+        hall.beacon_xyz_m,
+        hall.beacon_level,
+        *venue(beacons=(beacon(1, 1),)).beacon_places,
+    ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1
 
