@@ -1,27 +1,60 @@
 """How commands speak: results on standard output, everything else on standard error."""
 
+import errno
 import json
+import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from io import TextIOWrapper
 from typing import Any, TypeVar
 
+from blesim.report.printable import printable
+from blesim.stopping import refuse_if_stopped
+
 T = TypeVar("T")
+# A cell of a table: one line, or several.
+Cell = str | tuple[str, ...]
+
+
+def prepare_streams() -> None:
+    """Let every command print, whatever its streams are: closed, or unable to show a letter."""
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, mode, encoding="utf-8"))  # noqa: SIM115  # stays
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="replace")
 
 
 def report_fault(message: str) -> None:
-    """Print a fault, one line for each it has."""
-    for line in message.splitlines():
-        print(f"blesim: {line}", file=sys.stderr)  # noqa: T201  # this is where commands speak
+    """Print a fault, one line for each it has; nothing if nobody can be told."""
+    with suppress(OSError):
+        for line in message.split("\n"):
+            say(f"blesim: {line}")
+
+
+def report_lost_output(fault: OSError) -> None:
+    """Say that output could not be written, unless its reader has gone, and write no more."""
+    if fault.errno != errno.EPIPE:
+        report_fault(f"output cannot be written: {fault.strerror}")
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            # What is still held back would fail once more when the interpreter ends.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def say(message: str) -> None:
     """Print a line of news for a person."""
-    print(message, file=sys.stderr)  # noqa: T201  # this is where commands speak
+    print(printable(message), file=sys.stderr)  # noqa: T201  # this is where commands speak
 
 
 def answer(text: str) -> None:
-    """Print a result."""
-    print(text)  # noqa: T201  # this is where commands speak
+    """Print a result of one or more lines."""
+    for line in text.split("\n"):
+        print(printable(line))  # noqa: T201  # this is where commands speak
 
 
 def answer_json(value: Any) -> None:
@@ -29,7 +62,7 @@ def answer_json(value: Any) -> None:
     answer(json.dumps(value, indent=2, allow_nan=False))
 
 
-def answer_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+def answer_table(title: str, header: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
     """Print a table: text to the left, numbers (every column but the first) to the right."""
     from rich.console import Console
     from rich.table import Table
@@ -38,20 +71,44 @@ def answer_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]
     for number, name in enumerate(header):
         table.add_column(name, justify="right" if number else "left", no_wrap=True)
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*map(_as_it_is, row))
     # Into a file or a pipe no column may be cut off for want of a terminal's width.
     width = None if sys.stdout.isatty() else 200
     Console(width=width).print(table)
 
 
+def _as_it_is(cell: Cell) -> Any:
+    """Text of a cell; square brackets in a name are letters, not markup."""
+    from rich.text import Text
+
+    lines = (cell,) if isinstance(cell, str) else cell
+    return Text("\n".join(map(printable, lines)))
+
+
 def progress(items: Iterable[T], total: int, what: str) -> Iterator[T]:
-    """The items, with a bar on a terminal and a line each elsewhere, on standard error."""
-    if not sys.stderr.isatty():
-        for number, item in enumerate(items, start=1):
-            yield item
-            say(f"{what} {number}/{total}")
-        return
+    """The items, with a bar on a terminal and a line each elsewhere, on standard error.
+
+    Raises
+    ------
+    Stopped
+        After an item, if somebody wished it meanwhile.
+    """
+    shown = _bar if sys.stderr.isatty() else _lines
+    for item in shown(items, total, what):
+        yield item
+        refuse_if_stopped()
+
+
+def _lines(items: Iterable[T], total: int, what: str) -> Iterator[T]:
+    for number, item in enumerate(items, start=1):
+        yield item
+        say(f"{what} {number}/{total}")
+
+
+def _bar(items: Iterable[T], total: int, what: str) -> Iterator[T]:
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import track
 
-    yield from track(items, total=total, description=what, console=Console(stderr=True))
+    description = escape(printable(what))
+    yield from track(items, total=total, description=description, console=Console(stderr=True))

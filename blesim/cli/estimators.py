@@ -25,7 +25,7 @@ def estimators(
             (
                 each.name,
                 each.fault or ", ".join(each.needs) or "RSSI readings alone",
-                "\n".join(f"{p.name}={p.default}  ({p.type})" for p in each.parameters),
+                tuple(f"{p.name}={p.default}  ({p.type})" for p in each.parameters),
             )
             for each in described
         ],

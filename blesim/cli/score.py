@@ -37,13 +37,15 @@ def score(
     from blesim.errors import DataError
     from blesim.metrics.score import score as score_tracks
 
+    # A damaged recording has another digest as well; that it is damaged is the better news.
+    observed, truth = read_recording(recording), read_truth(recording)
     found = read_tracks(tracks)
     if found.recording_sha256 != sha256_of(recording):
         raise DataError(f"{tracks}: made from another recording than {recording}; estimate again")
-    observed, truth = read_recording(recording), read_truth(recording)
+    drawn = None if plot is None else _to_draw(observed, plot, plot_walk)
     rows = score_tracks(observed, truth, found.runs)
-    if plot is not None:
-        _draw(observed, truth, found.runs, plot_walk, output_path(plot, ""))
+    if plot is not None and drawn is not None:
+        _draw(observed, truth, found.runs, drawn, output_path(plot, ""))
         say(f"{plot}: drawn")
     if as_json:
         answer_json([row.as_dict() for row in rows])
@@ -70,28 +72,34 @@ def _cells(row: dict[str, Any]) -> list[str]:
     return [row["estimator"], row["walk"], str(row["n"]), *figures, share]
 
 
-def _draw(
-    recording: "Recording", truth: "Truth", runs: "Tracks", walk_name: str | None, plot: Path
-) -> None:
+def _to_draw(recording: "Recording", plot: Path, walk_name: str | None) -> str:
+    """Name of the walk to draw; what cannot be drawn is refused before the work."""
     from blesim.errors import DataError, UsageError
+    from blesim.metrics.score import scored_walks
+    from blesim.report.track_figure import refuse_unknown_format
+
+    refuse_unknown_format(plot)
+    names = [walk.name for walk in scored_walks(recording)]
+    if not names:
+        raise DataError("the recording has no walk to draw, only surveys")
+    if walk_name is not None and walk_name not in names:
+        raise UsageError(f"no walk '{walk_name}' to draw; there is {', '.join(names)}")
+    return names[0] if walk_name is None else walk_name
+
+
+def _draw(recording: "Recording", truth: "Truth", runs: "Tracks", name: str, plot: Path) -> None:
     from blesim.metrics.position_error import pooled
     from blesim.metrics.score import scored_walks, track_errors
     from blesim.report.track_figure import draw_tracks, save
     from blesim.tables import Track
 
-    walks = {walk.name: walk for walk in scored_walks(recording)}
-    if not walks:
-        raise DataError("the recording has no walk to draw, only surveys")
-    name = next(iter(walks)) if walk_name is None else walk_name
-    if name not in walks:
-        raise UsageError(f"no walk '{name}' to draw; there is {', '.join(walks)}")
     labels = dict.fromkeys(label for label, _ in runs)
     results = {key: run for key, run in runs.items() if isinstance(run, Track)}
     errors = {
         label: pooled(
             [
                 track_errors(recording, truth, walk, results[label, walk.name])
-                for walk in walks.values()
+                for walk in scored_walks(recording)
                 if (label, walk.name) in results
             ]
         ).error_m

@@ -1,12 +1,17 @@
 """`blesim simulate`: a scenario becomes a recording."""
 
+from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from blesim.cli.console import progress, say
 from blesim.cli.output import output_path
+
+if TYPE_CHECKING:
+    from blesim.recording import Walk
+    from blesim.venue.venue import Venue
 
 
 def simulate(
@@ -31,16 +36,26 @@ def simulate(
 
     simulation = Simulation.run(read_scenario(scenario), seed)
     target = output_path(output, f"{scenario.stem}.h5")
-    heard = 0
-    with RecordingWriter(
+    heard, silent = 0, {beacon.id for beacon in simulation.stage.surveyed.beacons}
+    file = RecordingWriter(
         target,
         venue_surveyed=simulation.stage.surveyed,
         venue_built=simulation.stage.built,
         provenance=simulation.provenance,
-    ) as writer:
-        for walk, truth in progress(simulation.walks(jobs), len(simulation.logs), "walk"):
+        beacon_events=simulation.lives.log,
+    )
+    with closing(simulation.walks(jobs)) as walks, file as writer:
+        for walk, truth in progress(walks, len(simulation.logs), "walk"):
             writer.append(walk, truth)
             heard += len(walk.observations.readings)
+            silent -= _beacons_heard(walk, simulation.stage.surveyed)
             if not len(walk.observations.readings):
                 say(f"walk '{walk.name}' heard no beacon at all")
+    if silent:
+        say(f"nobody heard {len(silent)} of the beacons: {', '.join(sorted(silent))}")
     say(f"{target}: {len(simulation.logs)} walks, {heard} readings, seed {simulation.seed}")
+
+
+def _beacons_heard(walk: "Walk", venue: "Venue") -> set[str]:
+    rows = set(walk.observations.readings.beacon.tolist())
+    return {venue.beacons[row].id for row in rows}
