@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from blesim.columns import LONGEST_STEP_M
 from blesim.rng import Draws
 from blesim.settings import Settings
 from blesim.tables import Steps, StepTruth
@@ -50,7 +51,7 @@ def read_steps(truth: StepTruth, sensor: StepSensor, seed: int, walker: str) -> 
     Returns
     -------
     Steps
-        One for each true step, at its time.
+        One for each true step, at its time; no length beyond what a recording holds.
     """
     ordinals = np.arange(len(truth))
     stretch = _stretch(truth.heading_rad)
@@ -63,7 +64,9 @@ def read_steps(truth: StepTruth, sensor: StepSensor, seed: int, walker: str) -> 
     )
     return Steps(
         time_us=truth.time_us,
-        length_m=np.maximum(scale * truth.length_m + sensor.length_std_m * single[:, 1], 0.0),
+        length_m=np.clip(
+            scale * truth.length_m + sensor.length_std_m * single[:, 1], 0.0, LONGEST_STEP_M
+        ),
         heading_rad=wrap_angle(truth.heading_rad + np.radians(heading_error_deg)),
     )
 

@@ -4,19 +4,21 @@ from collections.abc import Sized
 from dataclasses import dataclass
 from typing import Annotated, Literal, TypeVar
 
+import numpy as np
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 from pydantic_core.core_schema import no_info_after_validator_function
 
-from blesim.imu.step_events import StepSensor
-from blesim.radio.air import Propagation
-from blesim.radio.phone import Phone
+from blesim.columns import LONGEST_STEP_M
+from blesim.radio.beacon_events import BeaconEvent
 from blesim.rng import SEED_LIMIT
-from blesim.settings import Settings
+from blesim.scenario.presets import PhoneProfile, Radio
+from blesim.settings import LevelNumber, MapCoordinate, Name, Settings, Text
 from blesim.walkers.gait import Gait
 
-Name = Field(min_length=1, max_length=200)
+# On average: shorter ones would be hundreds of steps a metre.
+_SHORTEST_STEP_M = 0.1
 SizedT = TypeVar("SizedT", bound=Sized)
 
 
@@ -65,7 +67,7 @@ class VenueSource(Settings):
         estimators get these, the radio the true ones. [m]
     """
 
-    map: str | None = None
+    map: Text | None = None
     layout: Literal["wholesale-section", "wholesale-store"] | None = None
     survey_error_m: float = Field(default=0.0, ge=0, le=20)
 
@@ -91,10 +93,10 @@ class RouteStop(Settings):
         How long to stand there. [s]
     """
 
-    node: str | None = None
-    x_m: float | None = None
-    y_m: float | None = None
-    level: int = 0
+    node: Name | None = None
+    x_m: MapCoordinate | None = None
+    y_m: MapCoordinate | None = None
+    level: LevelNumber = 0
     pause_s: float = Field(default=0.0, ge=0, le=86400)
 
     @model_validator(mode="before")
@@ -135,7 +137,8 @@ class WalkPlan(Settings):
     split : str
         Part of a benchmark the walk belongs to.
     start_s : float
-        When it begins. [s]
+        When it begins, within the first week: beacons send from time 0 on, and everything before
+        the start is drawn as well. [s]
     speed_m_s : float
         Pace; indoors, with a phone in the hand, people walk about 1 m/s. [m/s]
     turn_rate_deg_s : float
@@ -149,23 +152,30 @@ class WalkPlan(Settings):
         Stops in order, joined by the shortest way along the aisles.
     """
 
-    name: str = Name
-    phone: str
+    name: Name
+    phone: Name
     carrying: Literal["hand"] = "hand"
     kind: Literal["walk", "survey"] = "walk"
-    split: str = ""
-    start_s: float = Field(default=0.0, ge=0, le=30 * 86400)
-    speed_m_s: float = Field(default=1.0, gt=0, le=10)
-    turn_rate_deg_s: float = Field(default=180.0, gt=0, le=3600)
+    split: Text = ""
+    start_s: float = Field(default=0.0, ge=0, le=7 * 86400)
+    speed_m_s: float = Field(default=1.0, ge=0.05, le=10)
+    turn_rate_deg_s: float = Field(default=180.0, ge=1, le=3600)
     gait: Gait = Gait()
     marks: Literal["way-points", "none"] = "way-points"
     route: Annotated[tuple[RouteStop, ...], AtLeast(2, "stops")]
 
-
-class PhoneProfile(Phone):
-    """A phone: its radio, and how well it reads steps."""
-
-    step_sensor: StepSensor = StepSensor()
+    @model_validator(mode="after")
+    def _steps_are_possible(self) -> "WalkPlan":
+        speed_m_s = np.array(self.speed_m_s)
+        mean_m = float(self.gait.step_length_m(speed_m_s))
+        longest_m = float(self.gait.longest_step_m(speed_m_s))
+        if mean_m < _SHORTEST_STEP_M or longest_m > LONGEST_STEP_M:
+            raise ValueError(
+                f"at {self.speed_m_s:g} m/s this gait makes steps of {mean_m:.2f} m, up to"
+                f" {longest_m:.2f} m; mend 'speed_m_s' or 'gait' for {_SHORTEST_STEP_M:g} to"
+                f" {LONGEST_STEP_M:g} m"
+            )
+        return self
 
 
 class Record(Settings):
@@ -196,8 +206,10 @@ class Scenario(Settings):
         Used unless the command line gives another.
     venue : VenueSource
         Where it happens.
-    radio : Propagation
+    radio : Radio
         How signals travel there.
+    beacon_events : tuple of BeaconEvent
+        What happens to beacons on the way.
     phones : dict of str to PhoneProfile
         Phone profiles by name.
     record : Record
@@ -206,11 +218,12 @@ class Scenario(Settings):
         Who walks where, with which phone.
     """
 
-    title: str = Name
-    license: str = "CC0-1.0"
+    title: Name
+    license: Text = "CC0-1.0"
     seed: int | None = Field(default=None, ge=0, lt=SEED_LIMIT)
     venue: VenueSource
-    radio: Propagation = Propagation()
-    phones: Annotated[dict[str, PhoneProfile], AtLeast(1, "phone")]
+    radio: Radio = Radio()
+    beacon_events: tuple[BeaconEvent, ...] = ()
+    phones: Annotated[dict[Name, PhoneProfile], AtLeast(1, "phone")]
     record: Record = Record()
     walks: Annotated[tuple[WalkPlan, ...], AtLeast(1, "walk")]

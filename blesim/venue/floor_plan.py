@@ -9,11 +9,10 @@ from shapely import Polygon
 from shapely.geometry.base import BaseGeometry
 
 from blesim.errors import VenueError
+from blesim.settings import LEVEL_RANGE
 from blesim.venue.materials import MATERIALS, Material
 
 FLOOR_TO_CEILING_M = float("inf")
-# What a recording can hold.
-_LEVELS = (-50, 200)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -144,8 +143,8 @@ def refuse_repeated(what: str, ids: Sequence[str]) -> None:
 
 def refuse_bad_level(who: str, level: int) -> None:
     """Raise `VenueError` if a recording could not hold the number of a level."""
-    if not _LEVELS[0] <= level <= _LEVELS[1]:
-        raise VenueError(f"{who}: level {level} is not within {_LEVELS[0]} to {_LEVELS[1]}")
+    if not LEVEL_RANGE[0] <= level <= LEVEL_RANGE[1]:
+        raise VenueError(f"{who}: level {level} is not within {LEVEL_RANGE[0]} to {LEVEL_RANGE[1]}")
 
 
 def _refuse_bad_outline(who: str, outline: Polygon) -> None:

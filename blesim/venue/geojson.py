@@ -9,10 +9,10 @@ from typing import Any, Literal, TypeVar
 from pydantic import ValidationError
 
 from blesim.errors import VenueError
-from blesim.settings import Settings
+from blesim.settings import Settings, Text, shortened, unreadable
 from blesim.venue.beacons import Beacon
 from blesim.venue.floor_plan import FloorPlan, Level, Obstacle
-from blesim.venue.geojson_features import FEATURES, Feature, Json, Part, reasons
+from blesim.venue.geojson_features import FEATURES, Feature, Json, Part, reasons, told
 from blesim.venue.geojson_written import features
 from blesim.venue.graph import AisleGraph, Edge, Node
 from blesim.venue.sections import Section
@@ -30,7 +30,7 @@ class _About(Settings):
     """The member that says what the coordinates are: without it they would be degrees."""
 
     coordinates: Literal["local metres"]
-    name: str
+    name: Text
     georeference: Georeference | None = None
 
 
@@ -103,7 +103,7 @@ def _compact(value: Any) -> str:
 
 def _parsed(text: str, where: str) -> Json:
     try:
-        document = json.loads(text, parse_constant=_refuse_constant)
+        document = json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_members)
     except json.JSONDecodeError as fault:
         raise VenueError(f"{where}:{fault.lineno}:{fault.colno}: not JSON: {fault.msg}") from fault
     except (ValueError, RecursionError) as fault:
@@ -111,6 +111,20 @@ def _parsed(text: str, where: str) -> Json:
     if not isinstance(document, dict):
         raise VenueError(f"{where}: not a GeoJSON FeatureCollection")
     return document
+
+
+def _members(pairs: list[tuple[str, Any]]) -> Json:
+    """A JSON object; `ValueError` for what JSON allows but no map needs, in names or texts."""
+    found: Json = {}
+    for name, value in pairs:
+        if name in found:
+            raise ValueError(f"member {told(name)} is there twice after {told(found)}")
+        for text in (name, value):
+            reason = unreadable(text) if isinstance(text, str) else None
+            if reason is not None:
+                raise ValueError(f"{told(text)} {reason}")
+        found[name] = value
+    return found
 
 
 def _refuse_constant(name: str) -> None:
@@ -162,7 +176,7 @@ def _part(feature: Any) -> Part:
         raise VenueError("a feature needs both properties and a geometry")
     kind = _kind(properties)
     if geometry.get("type") != kind.GEOMETRY:
-        raise VenueError(f"needs a {kind.GEOMETRY}, not {_compact(geometry.get('type'))}")
+        raise VenueError(f"needs a {kind.GEOMETRY}, not {told(geometry.get('type'))}")
     return kind.model_validate(properties).part(geometry.get("coordinates"))
 
 
@@ -170,7 +184,7 @@ def _kind(properties: Json) -> type[Feature]:
     name = properties.get("feature_type")
     if not isinstance(name, str) or name not in FEATURES:
         known = ", ".join(sorted(FEATURES))
-        raise VenueError(f"feature_type {_compact(name)} is not known; use one of {known}")
+        raise VenueError(f"feature_type {told(name)} is not known; use one of {known}")
     return FEATURES[name]
 
 
@@ -194,11 +208,11 @@ def _guessed_label(feature: Any) -> str:
         return ""
     match properties:
         case {"feature_type": "edge", "first": first, "second": second}:
-            return f"edge {first} - {second}"
+            return f"edge {shortened(str(first))} - {shortened(str(second))}"
         case {"feature_type": "level", "level": level}:
-            return f"level {level}"
+            return f"level {shortened(str(level))}"
         case {"feature_type": str(kind), "id": name}:
-            return f"{_NAMES.get(kind, kind)} '{name}'"
+            return f"{_NAMES.get(kind, shortened(kind))} '{shortened(str(name))}'"
     return ""
 
 

@@ -8,7 +8,7 @@ import shapely
 from pydantic import ValidationError
 
 from blesim.errors import VenueError
-from blesim.settings import Settings
+from blesim.settings import MAP_LIMIT_M, LevelNumber, Name, Settings, Text, shortened
 from blesim.venue.beacons import Beacon
 from blesim.venue.floor_plan import FLOOR_TO_CEILING_M, Level, Obstacle
 from blesim.venue.graph import Edge, Node
@@ -16,8 +16,6 @@ from blesim.venue.sections import Section
 
 Json = dict[str, Any]
 Part = Level | Obstacle | Node | Edge | Section | Beacon
-# As far as a recording reaches.
-_MAP_LIMIT_M = 1e5
 
 Positions = list[tuple[float, ...]]
 
@@ -38,7 +36,7 @@ class LevelFeature(Feature):
 
     GEOMETRY: ClassVar[str] = "Polygon"
     feature_type: Literal["level"] = "level"
-    level: int
+    level: LevelNumber
 
     def part(self, coordinates: Any) -> Level:
         """Level with its bounds."""
@@ -50,9 +48,9 @@ class FixtureFeature(Feature):
 
     GEOMETRY: ClassVar[str] = "Polygon"
     feature_type: Literal["fixture"] = "fixture"
-    id: str
-    material: str
-    level: int = 0
+    id: Name
+    material: Text
+    level: LevelNumber = 0
     height_m: float | None = None
 
     def part(self, coordinates: Any) -> Obstacle:
@@ -71,8 +69,8 @@ class NodeFeature(Feature):
 
     GEOMETRY: ClassVar[str] = "Point"
     feature_type: Literal["node"] = "node"
-    id: str
-    level: int = 0
+    id: Name
+    level: LevelNumber = 0
 
     def part(self, coordinates: Any) -> Node:
         """Node at its position."""
@@ -85,9 +83,9 @@ class EdgeFeature(Feature):
 
     GEOMETRY: ClassVar[str] = "LineString"
     feature_type: Literal["edge"] = "edge"
-    first: str
-    second: str
-    branch: str
+    first: Name
+    second: Name
+    branch: Text
     one_way: bool = False
 
     def part(self, coordinates: Any) -> Edge:
@@ -101,10 +99,10 @@ class SectionFeature(Feature):
 
     GEOMETRY: ClassVar[str] = "LineString"
     feature_type: Literal["section"] = "section"
-    id: str
-    category: str
-    branch: str
-    level: int = 0
+    id: Name
+    category: Text
+    branch: Text
+    level: LevelNumber = 0
 
     def part(self, coordinates: Any) -> Section:
         """Section between its ends."""
@@ -149,6 +147,11 @@ FEATURES: Mapping[str, type[Feature]] = {
 }
 
 
+def told(value: Any) -> str:
+    """A value from a map for a message: as JSON, its beginning where it is long."""
+    return shortened(json.dumps(value))
+
+
 def reasons(fault: ValidationError) -> list[str]:
     """Everything pydantic found wrong, in words, one reason a line."""
     return [_reason(error["loc"], error["type"], error["msg"]) for error in fault.errors()]
@@ -166,12 +169,12 @@ def _reason(place: tuple[int | str, ...], kind: str, message: str) -> str:
 
 def _position(coordinates: Any, count: int) -> tuple[float, ...]:
     if not isinstance(coordinates, list) or len(coordinates) != count:
-        raise VenueError(f"a position needs {count} coordinates, not {json.dumps(coordinates)}")
+        raise VenueError(f"a position needs {count} coordinates, not {told(coordinates)}")
     for number in coordinates:
         if isinstance(number, bool) or not isinstance(number, int | float):
-            raise VenueError(f"coordinate {json.dumps(number)} is not a number")
-        if not abs(number) <= _MAP_LIMIT_M:
-            raise VenueError(f"a coordinate beyond {_MAP_LIMIT_M:g} m is not in local metres")
+            raise VenueError(f"coordinate {told(number)} is not a number")
+        if not abs(number) <= MAP_LIMIT_M:
+            raise VenueError(f"a coordinate beyond {MAP_LIMIT_M:g} m is not in local metres")
     return tuple(float(number) for number in coordinates)
 
 

@@ -12,6 +12,9 @@ from blesim.venue.graph import AisleGraph, Edge, Node
 from blesim.venue.sections import Section
 from blesim.venue.venue import Venue
 
+# Written down only where they are something else than usual.
+_SELDOM = ("payload", "packet_spacing_us", "facing_deg", "front_to_back_db")
+
 
 def features(venue: Venue) -> Iterator[Json]:
     """GeoJSON features of all parts of a venue, each kind in its own order."""
@@ -79,7 +82,9 @@ def _section(section: Section) -> Json:
 def _beacon(beacon: Beacon) -> Json:
     place = [float(beacon.x_m), float(beacon.y_m), float(beacon.z_m)]
     own = beacon.model_dump(mode="json", exclude={"x_m", "y_m", "z_m"})
-    return _feature("amenity", place, category="beacon", **own)
+    usual = {name for name in _SELDOM if own[name] == Beacon.model_fields[name].default}
+    told = {name: value for name, value in own.items() if name not in usual}
+    return _feature("amenity", place, category="beacon", **told)
 
 
 def _rings(polygon: shapely.Polygon) -> list[Any]:

@@ -7,6 +7,7 @@ without special cases for an end that lies on an outline (a beacon on a shelf fa
 runs along a face is outside; an exactly vertical link crosses nothing.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, Self
@@ -14,6 +15,7 @@ from typing import NamedTuple, Self
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely import Polygon
 
 from blesim.kernels import kernel
 from blesim.venue.floor_plan import Obstacle
@@ -89,11 +91,16 @@ class LineOfSight:
         """
         _refuse_bad_ends(start_m, end_m)
         out = np.zeros((len(start_m), len(self.walls.height_m)))
-        _fill(start_m, end_m, self.walls, self.longest_outline, out, np.empty(0))
+        full = np.ones((len(self.walls.height_m), 1))
+        _fill(start_m, end_m, self.walls, self.longest_outline, full, 1.0, out, np.empty(0))
         return out
 
     def loss_db(
-        self, start_m: NDArray[np.float64], end_m: NDArray[np.float64]
+        self,
+        start_m: NDArray[np.float64],
+        end_m: NDArray[np.float64],
+        stock: NDArray[np.float64] | None = None,
+        bay_m: float = 1.0,
     ) -> NDArray[np.float64]:
         """Loss of each link through all obstacles: per crossing plus per metre; see `Material`.
 
@@ -101,6 +108,11 @@ class LineOfSight:
         ----------
         start_m, end_m : ndarray of float64, (n, 3)
             Ends of the links: x, y and height above the floor. [m]
+        stock : ndarray of float64, (number of obstacles, bays), optional
+            Factor of the loss of each bay, counted along the longer side of the outline's box; a
+            link has the factor of the bay where it first crosses. [-]
+        bay_m : float
+            Length of a bay. [m]
 
         Returns
         -------
@@ -108,9 +120,17 @@ class LineOfSight:
             [dB]
         """
         _refuse_bad_ends(start_m, end_m)
-        out = np.zeros(len(start_m))
-        _fill(start_m, end_m, self.walls, self.longest_outline, np.empty((0, 0)), out)
+        if stock is None:
+            stock = np.ones((len(self.walls.height_m), 1))
+        out, nothing = np.zeros(len(start_m)), np.empty((0, 0))
+        _fill(start_m, end_m, self.walls, self.longest_outline, stock, bay_m, nothing, out)
         return out
+
+
+def bays_of(outline: Polygon, bay_m: float) -> int:
+    """Number of bays along the longer side of an outline's box; see `LineOfSight.loss_db`."""
+    west, south, east, north = outline.bounds
+    return max(1, math.ceil(max(east - west, north - south) / bay_m - 1e-9))
 
 
 def _refuse_bad_ends(start_m: NDArray[np.float64], end_m: NDArray[np.float64]) -> None:
@@ -249,11 +269,25 @@ def _inside(
 
 
 @kernel
+def _bay(
+    link: _Link, box: NDArray[np.float64], row: int, share: float, bay_m: float, bays: int
+) -> int:
+    """Bay of an obstacle that a link enters at a share of its way (kernel)."""
+    if box[row, 2] - box[row, 0] >= box[row, 3] - box[row, 1]:
+        along_m = link.x + share * link.along_x - box[row, 0]
+    else:
+        along_m = link.y + share * link.along_y - box[row, 1]
+    return min(max(int(along_m / bay_m), 0), bays - 1)
+
+
+@kernel
 def _fill(
     start: NDArray[np.float64],
     end: NDArray[np.float64],
     walls: _Walls,
     longest_outline: int,
+    stock: NDArray[np.float64],
+    bay_m: float,
     lengths: NDArray[np.float64],
     losses: NDArray[np.float64],
 ) -> None:
@@ -279,5 +313,7 @@ def _fill(
                 length, crossings = _inside(link, both, count, low, high)
             if len(lengths):
                 lengths[row, k] = length
-            if len(losses):
-                losses[row] += crossings * crossing_db[k] + length * metre_db[k]
+            if len(losses) and crossings:
+                full_db = crossings * crossing_db[k] + length * metre_db[k]
+                bay = _bay(link, box, k, max(shares[0], low), bay_m, stock.shape[1])
+                losses[row] += full_db * stock[k, bay]

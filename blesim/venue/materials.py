@@ -23,12 +23,15 @@ class Material(Settings):
         Loss of each crossing, however long. [dB]
     metre_db : float
         Loss of each metre inside the obstacle, added to that of the crossing. [dB/m]
+    stocked : bool
+        Whether the loss is that of what stands in it, and varies with it.
     source : str
         Where the numbers come from.
     """
 
     crossing_db: float = Field(ge=0)
     metre_db: float = Field(ge=0, default=0.0)
+    stocked: bool = False
     source: str
 
 
@@ -47,10 +50,10 @@ MATERIALS = MappingProxyType(
         "concrete-20cm": Material(crossing_db=14.8, source=_P2040),
         "light-wall": Material(crossing_db=3.4, source=_COST231),
         "heavy-wall": Material(crossing_db=6.9, source=_COST231),
-        "bookcase": Material(crossing_db=1.45, source=_UJI),
+        "bookcase": Material(crossing_db=1.45, stocked=True, source=_UJI),
         "pillar": Material(crossing_db=2.05, source=_UJI),
         "office-partition": Material(crossing_db=2.05, source=_UJI),
-        "gondola-dry": Material(crossing_db=3.0, source=_ASSUMED),
-        "gondola-liquid": Material(crossing_db=9.0, source=_ASSUMED),
+        "gondola-dry": Material(crossing_db=3.0, stocked=True, source=_ASSUMED),
+        "gondola-liquid": Material(crossing_db=9.0, stocked=True, source=_ASSUMED),
     }
 )

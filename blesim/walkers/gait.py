@@ -11,6 +11,8 @@ from blesim.tables import StepTruth, Trajectory
 from blesim.units import MICROSECONDS_PER_SECOND
 
 _WALKING = dict(columns.STATES)["walking"]
+# The variation is below 0.3, so three standard deviations leave every interval positive.
+_LARGEST_DEVIATION = 3.0
 
 
 class Gait(Settings):
@@ -32,6 +34,11 @@ class Gait(Settings):
     def step_length_m(self, speed_m_s: NDArray[np.float64]) -> NDArray[np.float64]:
         """Mean step length at a speed, any shape. [m]."""
         return self.length_at_rest_m + self.length_per_speed_s * speed_m_s
+
+    def longest_step_m(self, speed_m_s: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Length that no step at a steady speed exceeds, any shape. [m]."""
+        most = 1.0 + _LARGEST_DEVIATION * self.interval_variation
+        return most * self.step_length_m(speed_m_s)
 
 
 def steps_of(trajectory: Trajectory, gait: Gait, seed: int, walker: str) -> StepTruth:
@@ -75,9 +82,9 @@ def steps_of(trajectory: Trajectory, gait: Gait, seed: int, walker: str) -> Step
 
 def _phase_marks(last: float, gait: Gait, seed: int, walker: str) -> NDArray[np.float64]:
     """Phases at which a foot is set down, up to `last`."""
-    # The variation is below 0.3, so three standard deviations leave every interval positive.
     enough = int(2 * last) + 10
     draws = Draws(seed=seed, purpose="step interval", walker=walker)
-    deviation = np.clip(draws.normals(np.arange(enough))[:, 0], -3.0, 3.0)
+    deviation = draws.normals(np.arange(enough))[:, 0]
+    deviation = np.clip(deviation, -_LARGEST_DEVIATION, _LARGEST_DEVIATION)
     marks = np.cumsum(1.0 + gait.interval_variation * deviation)
     return marks[marks <= last]

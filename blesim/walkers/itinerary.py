@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
-from blesim.venue.graph import GraphPosition
+from blesim.venue.graph import GraphPosition, read_only
 from blesim.venue.venue import Venue
 
 _FASTEST_M_S = 10.0
@@ -22,6 +22,31 @@ class Stop:
     def __post_init__(self) -> None:
         if not 0.0 <= self.pause_s < float("inf"):
             raise UsageError(f"pause_s {self.pause_s}: a pause cannot be negative or endless")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WayPoints:
+    """Places that a tester can tell by sight.
+
+    Attributes
+    ----------
+    xy_m : ndarray of float64, (n, 2)
+        On the graph. [m]
+    level : ndarray of int16, (n,)
+    """
+
+    xy_m: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    level: NDArray[np.int16] = field(default_factory=lambda: np.empty(0, np.int16))
+
+    def __post_init__(self) -> None:
+        if self.xy_m.shape != (len(self.level), 2):
+            raise UsageError(f"way points: {self.xy_m.shape} positions, {len(self.level)} levels")
+        read_only(self.xy_m)
+        read_only(self.level)
+
+    def __len__(self) -> int:
+        """How many."""
+        return len(self.level)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,8 +65,8 @@ class Itinerary:
         Pace. [m/s]
     turn_rate_rad_s : float
         How fast the walker turns on the spot where the way bends. [rad/s]
-    marks_m : ndarray of float64, (n, 2)
-        Way points at whose passing the tester presses, on the graph. [m]
+    way_points : WayPoints
+        Where the tester presses in passing.
     """
 
     walker: str
@@ -49,7 +74,7 @@ class Itinerary:
     start_s: float = 0.0
     speed_m_s: float = 1.0
     turn_rate_rad_s: float = np.pi
-    marks_m: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 2)))
+    way_points: WayPoints = field(default_factory=WayPoints)
 
     def __post_init__(self) -> None:
         if len(self.stops) < 2:
@@ -58,21 +83,14 @@ class Itinerary:
             raise UsageError(f"walker '{self.walker}': speed_m_s must be above 0, up to 10")
         if not self.turn_rate_rad_s > 0.0:
             raise UsageError(f"walker '{self.walker}': turn_rate_rad_s must be positive")
-        self.marks_m.flags.writeable = False
 
 
-def way_points_m(venue: Venue) -> NDArray[np.float64]:
-    """Places that a tester can tell by sight: ends of product sections and junctions.
-
-    Returns
-    -------
-    ndarray of float64, (n, 2)
-        Each once. [m]
-    """
-    ends = [end for section in venue.sections for end in (section.start_m, section.end_m)]
+def way_points(venue: Venue) -> WayPoints:
+    """Ends of product sections, and junctions, each once."""
+    ends = [(s.level, *end) for s in venue.sections for end in (s.start_m, s.end_m)]
     if venue.graph is not None:
         branches = venue.graph.branches_of_node
-        ends += [(n.x_m, n.y_m) for n in venue.graph.nodes if len(branches[n.id]) > 1]
-    if not ends:
-        return np.empty((0, 2))
-    return np.unique(np.round(np.array(ends, dtype=np.float64), 6), axis=0)
+        ends += [(n.level, n.x_m, n.y_m) for n in venue.graph.nodes if len(branches[n.id]) > 1]
+    rows = np.array(ends, dtype=np.float64).reshape(-1, 3)
+    rows = np.unique(np.round(rows, 6), axis=0)
+    return WayPoints(xy_m=rows[:, 1:].copy(), level=rows[:, 0].astype(np.int16))

@@ -119,21 +119,25 @@ class Walker:
     def _press(self, env: simpy.Environment, place: GraphPosition) -> None:
         """Mark the start of the route, if it is a way point."""
         x_m, y_m = self.graph.xy_m([place.edge], [place.offset_m])[0]
-        marks_m = self.itinerary.marks_m
-        if np.any(np.hypot(marks_m[:, 0] - x_m, marks_m[:, 1] - y_m) <= SAME_PLACE_M):
-            self.log.marks.append((env.now, x_m, y_m, self._level(place.edge)))
+        points = self.itinerary.way_points
+        here = np.hypot(points.xy_m[:, 0] - x_m, points.xy_m[:, 1] - y_m) <= SAME_PLACE_M
+        level = self._level(place.edge)
+        if np.any(here & (points.level == level)):
+            self.log.marks.append((env.now, x_m, y_m, level))
 
     def _way_points_on(self, leg: Leg) -> list[tuple[NDArray[np.float64], float]]:
         """Way points passed on a leg, its start left out, with the share of the leg before them."""
         start_m, end_m = self.graph.xy_m([leg.edge, leg.edge], [leg.start_m, leg.end_m])
         along = (end_m - start_m) / leg.length_m
-        relative = self.itinerary.marks_m - start_m
+        points = self.itinerary.way_points
+        relative = points.xy_m - start_m
         ahead_m = relative @ along
         aside_m = np.abs(relative @ np.array([-along[1], along[0]]))
         passed = (aside_m <= SAME_PLACE_M) & (ahead_m > SAME_PLACE_M)
         passed &= ahead_m <= leg.length_m + SAME_PLACE_M
+        passed &= points.level == self._level(leg.edge)
         found = [
-            (self.itinerary.marks_m[row], min(float(ahead_m[row]) / leg.length_m, 1.0))
+            (points.xy_m[row], min(float(ahead_m[row]) / leg.length_m, 1.0))
             for row in np.flatnonzero(passed)
         ]
         return sorted(found, key=lambda pair: pair[1])

@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from blesim import columns
 from blesim.imu.step_events import StepSensor, read_steps
 from blesim.tables import Steps, StepTruth
 from blesim.units import wrap_angle
@@ -49,6 +50,19 @@ def test_a_perfect_sensor_reads_the_truth():
     assert np.array_equal(read.time_us, truth.time_us)
     assert np.array_equal(read.length_m, truth.length_m)
     assert read.heading_rad == pytest.approx(truth.heading_rad, abs=2e-6)
+
+
+def test_no_reading_is_beyond_what_a_recording_holds():
+    truth = walked(1, 5000)
+    long_steps = StepTruth(
+        time_us=truth.time_us,
+        length_m=np.full(len(truth), 2.9),
+        heading_rad=truth.heading_rad,
+        foot=truth.foot,
+    )
+    read = read_steps(long_steps, StepSensor(length_std_m=0.3), 3, "w")
+    (column,) = (column for column in columns.STEPS.columns if column.name == "length")
+    assert read.length_m.max() == column.valid_range[1]
 
 
 def test_no_steps_give_no_events():

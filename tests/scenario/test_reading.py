@@ -2,13 +2,19 @@ import contextlib
 import re
 
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import strategies as st
 
 from blesim.errors import ScenarioError
-from blesim.radio.air import Propagation
+from blesim.radio.propagation import Propagation
 from blesim.scenario.build import set_stage
 from blesim.scenario.reading import read_scenario
+from blesim.venue.floor_plan import FloorPlan, Level, Obstacle
+from blesim.venue.geojson import to_geojson
+from blesim.venue.graph import AisleGraph, Edge, Node
+from blesim.venue.venue import Venue
+from blesim.walkers.walker import simulate_walkers
 
 GOOD = """\
 title: Ten lines
@@ -87,12 +93,55 @@ def test_changed_parameters_are_checked_and_told_in_the_text(scenario):
         ("title: Ten lines\n", "", "scenario.yaml:1: title: missing"),
         ("seed: 1", "seed: 1\nseed: 2", "scenario.yaml:3: not valid YAML: "),
         ("seed: 1", "seed: [1", "scenario.yaml:3: not valid YAML: "),
+        ("seed: 1", "seed: " + "9" * 400, "scenario.yaml:2: seed: Input should be less than"),
+        ("Ten lines", "2020-01-01", "scenario.yaml:1: title: a date is no value here"),
+        ("Ten lines", '"a\\nb"', "scenario.yaml:1: title: holds the control character U+000A"),
+        ("Ten lines", "t" * 201, "scenario.yaml:1: title: String should have at most 200"),
+        ("x_m: 30.0", "x_m: 1e308", "scenario.yaml:10: walks.0.route.2.x_m: "),
+        ("x_m: 30.0", "x_m: " + "9" * 400, "scenario.yaml:10: walks.0.route.2.x_m: "),
+        ("y_m: 8.2", "level: 10000, y_m: 8.2", "scenario.yaml:10: walks.0.route.2.level: "),
+        ("y_m: 8.2", "level: 3, y_m: 8.2", "scenario.yaml:10: walks.0.route.2: the aisle graph"),
+        ("speed_m_s: 1.2", "speed_m_s: 0.049", "scenario.yaml:9: walks.0.speed_m_s: "),
+        ("speed_m_s: 1.2", "turn_rate_deg_s: 0.9", "scenario.yaml:9: walks.0.turn_rate_deg_s: "),
+        ("speed_m_s: 1.2", "start_s: 604801", "scenario.yaml:9: walks.0.start_s: "),
+        ("speed_m_s: 1.2", "speed_m_s: 10", "scenario.yaml:7: walks.0: at 10 m/s this gait makes"),
+        (
+            "speed_m_s: 1.2",
+            "gait: {length_at_rest_m: 0.01, length_per_speed_s: 0}",
+            "scenario.yaml:7: walks.0: at 1 m/s this gait makes steps of 0.01 m",
+        ),
+        (
+            "D1, D5",
+            "D1" + ", {node: D5, pause_s: 86400}" * 31,
+            "scenario.yaml:7: walks.0: may go on until 26784",
+        ),
+        ("layout: wholesale-section", 'map: "a\\0b"', "scenario.yaml:3: venue.map: holds the cont"),
     ],
 )
 def test_a_fault_is_told_with_its_line(scenario, old, new, expected):
     assert old in GOOD
     (line,) = faults(scenario(GOOD.replace(old, new)))
     assert line.startswith(expected)
+    assert len(line) < 200
+
+
+@pytest.mark.parametrize(
+    "pace",
+    ["speed_m_s: 3.0", "speed_m_s: 0.05", "start_s: 604800", "turn_rate_deg_s: 1"],
+)
+def test_a_pace_that_is_possible_is_taken(scenario, pace):
+    (itinerary,) = set_stage(
+        read_scenario(scenario(GOOD.replace("speed_m_s: 1.2", pace))), 1
+    ).itineraries
+    assert itinerary.walker == "run"
+
+
+def test_a_byte_order_mark_is_no_part_of_a_scenario_or_a_map(scenario, tmp_path, section):
+    (tmp_path / "map.geojson").write_text("\ufeff" + to_geojson(section), encoding="utf-8")
+    text = GOOD.replace("layout: wholesale-section", "map: map.geojson")
+    file = read_scenario(scenario("\ufeff" + text))
+    assert file.text == text
+    assert set_stage(file, 1).built == section
 
 
 def test_all_faults_are_told_at_once(scenario):
@@ -136,8 +185,6 @@ def test_a_missing_file_and_bad_bytes_are_refused(tmp_path):
 
 
 def test_a_route_that_does_not_connect_is_refused_at_its_stop(scenario, tmp_path, section):
-    from blesim.venue.geojson import to_geojson
-
     text = to_geojson(section)
     lines = [line for line in text.splitlines(keepends=True) if '"branch": "east"' not in line]
     cut = "".join(line for line in lines if '"branch": "west"' not in line)
@@ -147,8 +194,6 @@ def test_a_route_that_does_not_connect_is_refused_at_its_stop(scenario, tmp_path
 
 
 def test_a_map_with_a_beacon_inside_a_shelf_is_refused(scenario, tmp_path, section):
-    from blesim.venue.geojson import to_geojson
-
     text = to_geojson(section).replace("[3.8, 15.4, 2.0]", "[3.9, 15.6, 2.0]")
     (tmp_path / "map.geojson").write_text(text, encoding="utf-8")
     lines = faults(scenario(GOOD.replace("layout: wholesale-section", "map: map.geojson")))
@@ -171,6 +216,84 @@ def test_surveying_errors_move_what_estimators_know_not_what_is_built(scenario):
     assert all((error[:, 2] == 0).all() for error in errors)
 
 
+@pytest.mark.parametrize("error_m", [0, 1])
+def test_no_survey_tells_what_only_the_hardware_knows(scenario, tmp_path, section, error_m):
+    front = {"facing_deg": 90.0, "front_to_back_db": 6.0}
+    gains = section.with_beacons(
+        tuple(
+            beacon.model_copy(update={"channel_gain_db": (2.0, -1.0, 0.5), **front})
+            for beacon in section.beacons
+        )
+    )
+    (tmp_path / "map.geojson").write_text(to_geojson(gains), encoding="utf-8")
+    source = f"map: map.geojson, survey_error_m: {error_m}"
+    stage = set_stage(read_scenario(scenario(GOOD.replace("layout: wholesale-section", source))), 1)
+    assert {beacon.channel_gain_db for beacon in stage.built.beacons} == {(2.0, -1.0, 0.5)}
+    assert {beacon.channel_gain_db for beacon in stage.surveyed.beacons} == {(0.0, 0.0, 0.0)}
+    # Which way a beacon faces can be seen.
+    assert {beacon.front_to_back_db for beacon in stage.surveyed.beacons} == {6.0}
+    moved_m = abs(stage.surveyed.beacon_xyz_m - stage.built.beacon_xyz_m).max()
+    assert (moved_m > 0.1) == (error_m > 0)
+
+
+def two_levels(section: Venue) -> Venue:
+    """One aisle on each of two levels, a third level full of machines, and a beacon on each."""
+    nodes = tuple(
+        Node(id=f"{name}{level}", x_m=x_m, y_m=5.0, level=level)
+        for level in (0, 1)
+        for name, x_m in (("a", 1.0), ("b", 9.0))
+    )
+    edges = tuple(Edge(first=f"a{level}", second=f"b{level}", branch="x") for level in (0, 1))
+    ground = shapely.box(0, 0, 10, 10)
+    full = Obstacle(id="plant", outline=ground, material="heavy-wall", level=2, height_m=1.0)
+    places = [
+        {"id": f"B{level}", "x_m": 0.0, "y_m": 5.0, "z_m": 2.0, "level": level}
+        for level in range(3)
+    ]
+    return Venue(
+        name="two",
+        floor_plan=FloorPlan(
+            levels=tuple(Level(level=level, bounds=ground) for level in range(3)),
+            obstacles=(full,),
+        ),
+        beacons=tuple(section.beacons[0].model_copy(update=place) for place in places),
+        graph=AisleGraph(nodes=nodes, edges=edges),
+    )
+
+
+ON_LEVELS = """\
+title: Levels
+venue: {map: map.geojson, survey_error_m: 1}
+phones: {phone: {}}
+walks:
+  - {name: low, phone: phone, route: [a0, b0]}
+  - {name: high, phone: phone, route: [{x_m: 1.0, y_m: 5.0, level: 1}, b1]}
+"""
+
+
+def test_everybody_walks_on_their_own_level(scenario, tmp_path, section):
+    venue = two_levels(section)
+    (tmp_path / "map.geojson").write_text(to_geojson(venue), encoding="utf-8")
+    stage = set_stage(read_scenario(scenario(ON_LEVELS)), 1)
+    logs = simulate_walkers(stage.graph, stage.itineraries)
+    assert [set(log.trajectory().level.tolist()) for log in logs] == [{0}, {1}]
+
+
+def test_a_route_from_one_level_to_another_is_refused(scenario, tmp_path, section):
+    (tmp_path / "map.geojson").write_text(to_geojson(two_levels(section)), encoding="utf-8")
+    (line,) = faults(scenario(ON_LEVELS.replace("[a0, b0]", "[a0, b1]")))
+    assert line.startswith("scenario.yaml:5: walks.0.route.1: no way leads from node 'a0' to")
+
+
+def test_where_nobody_can_stand_a_beacon_is_written_down_where_it_is(scenario, tmp_path, section):
+    venue = two_levels(section)
+    (tmp_path / "map.geojson").write_text(to_geojson(venue), encoding="utf-8")
+    stage = set_stage(read_scenario(scenario(ON_LEVELS)), 1)
+    off_m = abs(stage.surveyed.beacon_xyz_m - venue.beacon_xyz_m).max(axis=1)
+    assert off_m[0] > 0
+    assert off_m[2] == 0
+
+
 @given(text=st.text(max_size=200) | st.binary(max_size=200).map(lambda b: b.decode("latin-1")))
 def test_no_text_makes_anything_but_a_scenario_error(tmp_path_factory, text):
     path = tmp_path_factory.mktemp("any") / "scenario.yaml"
@@ -182,7 +305,21 @@ def test_no_text_makes_anything_but_a_scenario_error(tmp_path_factory, text):
 @given(
     line=st.integers(0, len(GOOD.splitlines()) - 1),
     value=st.sampled_from(
-        ["", "null", "[]", "{}", "-1", "1e400", "~", "'", "&a *a", "!!python/x 1"]
+        [
+            *("", "null", "[]", "{}", "-1", "1e400", "~", "'", "&a *a", "!!python/x 1", "&a [*a]"),
+            *("!foo {}", "!!set {a, b}", "!!binary aGFs", "2020-01-01", "2020-99-99", "!!int abc"),
+            *(
+                '"\\0"',
+                '"\\ud800"',
+                "{<<: 1}",
+                "{? [a] : b}",
+                "{1: 2}",
+                "9" * 400,
+                "1e308",
+                "t" * 300,
+            ),
+            *("[" * 300, "&b {<<: *b}", "&c 1\n&c ? x", "\t", "!!float ''"),
+        ]
     ),
 )
 def test_a_spoiled_line_never_escapes_as_anything_else(tmp_path_factory, line, value):

@@ -45,9 +45,22 @@ def test_the_good_case() -> None:
         ("measured_power_dbm", -128.0),
         ("advertising_interval_s", 0.019375),
         ("advertising_interval_s", 10.240625),
+        ("id", "D\n1"),
+        ("x_m", 1e6),
+        ("y_m", -1e6),
+        ("z_m", 1e6),
+        ("level", 201),
         ("channel_gain_db", (1.0, 2.0)),
+        ("channel_gain_db", (0.0, 0.0, 30.5)),
+        ("channel_gain_db", (-30.5, 0.0, 0.0)),
         ("uuid", "f7826da6"),
         ("level", 0.5),
+        ("payload", "altbeacon"),
+        ("packet_spacing_us", 399),
+        ("packet_spacing_us", 1000.5),
+        ("facing_deg", 361.0),
+        ("front_to_back_db", -1.0),
+        ("front_to_back_db", 6.0),
     ],
 )
 def test_impossible_values(field: str, value: object) -> None:
@@ -66,6 +79,19 @@ def test_every_interval_of_the_standard_is_accepted(steps: int) -> None:
 def test_an_interval_between_the_steps_names_the_nearest() -> None:
     with pytest.raises(ValidationError, match=r"multiple of 0\.625 ms; the nearest is 0\.318125 s"):
         beacon(advertising_interval_s=0.318)
+
+
+@pytest.mark.parametrize(
+    ("payload", "duration_us"),
+    # 8 us a byte and 16 bytes of overhead; 30 bytes of data in an iBeacon, 31 in an Eddystone-UID.
+    [("ibeacon", 8 * (16 + 30)), ("eddystone-uid", 8 * (16 + 31))],
+)
+def test_a_packet_is_as_long_as_its_payload(payload: str, duration_us: int) -> None:
+    assert beacon(payload=payload).packet_duration_us == duration_us
+
+
+def test_an_antenna_with_a_front_faces_somewhere() -> None:
+    assert beacon(facing_deg=90.0, front_to_back_db=6.0).front_to_back_db == 6.0
 
 
 def test_a_beacon_is_frozen() -> None:

@@ -5,9 +5,7 @@ import pytest
 import shapely
 from shapely import Polygon, box
 
-from blesim import columns
 from blesim.errors import VenueError
-from blesim.venue import floor_plan as module
 from blesim.venue.floor_plan import FloorPlan, Level, Obstacle
 
 HALL = Level(level=0, bounds=box(0, 0, 20, 10))
@@ -64,11 +62,6 @@ def test_bad_levels() -> None:
         Level(level=0, bounds=BOW_TIE)
     with pytest.raises(VenueError, match="level 40000 is not within -50 to 200"):
         Level(level=40_000, bounds=box(0, 0, 1, 1))
-
-
-def test_levels_are_those_a_recording_can_hold() -> None:
-    (column,) = (c for c in columns.NODES.columns if c.name == "level")
-    assert column.valid_range == module._LEVELS
 
 
 @pytest.mark.parametrize(

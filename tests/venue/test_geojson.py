@@ -108,7 +108,7 @@ def test_floor_to_ceiling_has_no_height(venue: Venue) -> None:
     assert fixtures[1]["height_m"] == 1.8
 
 
-names = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=8)
+names = st.text(st.characters(exclude_categories=["Cc", "Cs", "Zl", "Zp"]), min_size=1, max_size=8)
 inside = st.floats(0.5, 9.5)
 
 
@@ -151,6 +151,14 @@ def venues(draw: st.DrawFn) -> Venue:
                 tx_power_dbm=draw(st.floats(-40, 20)),
                 advertising_interval_s=draw(st.integers(32, 16384)) * 0.000_625,
                 channel_gain_db=tuple(draw(st.floats(-9, 9)) for _ in range(3)),
+                payload=draw(st.sampled_from(["ibeacon", "eddystone-uid"])),
+                packet_spacing_us=draw(st.none() | st.integers(400, 5000)),
+                **draw(
+                    st.just({})
+                    | st.fixed_dictionaries(
+                        {"facing_deg": st.floats(-360, 360), "front_to_back_db": st.floats(0, 40)}
+                    )
+                ),
             )
             for name in draw(st.lists(names, max_size=3, unique=True))
         ),
@@ -282,7 +290,23 @@ FAULTS = {
     "no such node": (properties(7, second="c"), "feature 7 (edge a - c): there is no node 'c'"),
     "twice": (properties(10, id="D3"), "feature 10 (beacon 'D3'): is there twice"),
     "no beacon": (properties(9, category="lift"), "input should be 'beacon'"),
-    "level of no building": (properties(1, level=10**30), "feature 1 (level 1000"),
+    "level of no building": (properties(1, level=10**300), "feature 1 (level 1000"),
+    "long name": (properties(3, id="s" * 201), "property 'id': string should have at most 200"),
+    "loud channel": (
+        properties(9, channel_gain_db=[0, 31, 0]),
+        "feature 9 (beacon 'D3'): property 'channel_gain_db.1': input should be less than",
+    ),
+    "much else": (geometry(9, coordinates=[7] * 999), "needs 3 coordinates, not [7, 7, "),
+    "line break": (properties(3, id="S\n1"), r'"S\n1" holds the control character U+000A'),
+    "null": (properties(9, id="D\0"), r'"D\u0000" holds the control character U+0000'),
+    "half a character": (
+        properties(10, payload="\ud800"),
+        r'"\ud800" holds the control character U+D800',
+    ),
+    "line break in a property": (
+        properties(4, **{"a\nb": 1}),
+        r'"a\nb" holds the control character U+000A',
+    ),
 }
 
 
@@ -291,6 +315,14 @@ def test_faults_of_one_feature(venue: Venue, name: str) -> None:
     change, expected = FAULTS[name]
     (line,) = faults(changed(venue, change))
     assert expected in line
+    assert len(line) < 300
+
+
+def test_a_member_that_is_there_twice(venue: Venue) -> None:
+    text = to_geojson(venue)
+    (line,) = faults(text.replace('"id": "S2",', '"id": "S2", "id": "S3",'))
+    start = '{"feature_type": "fixture", "id": "S2"}'
+    assert line == f' not a map: member "id" is there twice after {start}'
 
 
 def test_infinite_numbers(venue: Venue) -> None:

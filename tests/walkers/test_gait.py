@@ -57,6 +57,15 @@ def test_steps_add_up_to_the_way_but_for_the_last():
     assert 100.0 - 1.0 < steps.length_m.sum() <= 100.0 + 1e-6
 
 
+@pytest.mark.parametrize("speed_m_s", [0.05, 1.0, 6.0])
+def test_no_step_is_longer_than_the_gait_allows(speed_m_s):
+    gait = Gait(interval_variation=0.25)
+    steps = steps_of(straight_walk(1500.0, speed_m_s), gait, 5, "w")
+    longest_m = float(gait.longest_step_m(np.array(speed_m_s)))
+    # Three standard deviations are reached once in 740 steps.
+    assert 0.95 * longest_m < steps.length_m.max() <= longest_m + 1e-4
+
+
 def test_nobody_steps_while_standing():
     trajectory = straight_walk(40.0, 1.0, pause_s=60.0)
     steps = steps_of(trajectory, Gait(), 5, "w")

@@ -1,9 +1,12 @@
 import numpy as np
 import pytest
+from shapely import box
 
 from blesim.errors import UsageError, VenueError
+from blesim.venue.floor_plan import FloorPlan, Level
 from blesim.venue.graph import AisleGraph, Edge, GraphPosition, Node
-from blesim.walkers.itinerary import Itinerary, Stop, way_points_m
+from blesim.venue.venue import Venue
+from blesim.walkers.itinerary import Itinerary, Stop, WayPoints, way_points
 from blesim.walkers.walker import simulate_walkers
 
 # Two aisles of 10 m that meet at a right angle in B; C - D cannot be reached, D - A is one-way.
@@ -22,6 +25,10 @@ GRAPH = AisleGraph(
 
 def stops(*names: str, pause_s: float = 0.0) -> tuple[Stop, ...]:
     return tuple(Stop(place=GRAPH.at_node(name), pause_s=pause_s) for name in names)
+
+
+def at(*xy_m: list[float], level: int = 0) -> WayPoints:
+    return WayPoints(xy_m=np.array(xy_m), level=np.full(len(xy_m), level, np.int16))
 
 
 def walked(**settings):
@@ -81,16 +88,50 @@ def test_turning_round_takes_half_a_turn():
 
 
 def test_marks_are_pressed_where_and_when_a_way_point_is_passed():
-    way_points = np.array([[0.0, 0.0], [2.5, 0.0], [10.0, 0.0], [10.0, 4.0], [5.0, 5.0]])
-    _, marks = walked(speed_m_s=1.0, turn_rate_rad_s=np.pi / 2, marks_m=way_points)
+    points = at([0.0, 0.0], [2.5, 0.0], [10.0, 0.0], [10.0, 4.0], [5.0, 5.0])
+    _, marks = walked(speed_m_s=1.0, turn_rate_rad_s=np.pi / 2, way_points=points)
     assert marks.time_us.tolist() == [0, 2_500_000, 10_000_000, 15_000_000]
     assert marks.x_m.tolist() == [0, 2.5, 10, 10]
     assert marks.y_m.tolist() == [0, 0, 0, 4]
 
 
 def test_a_way_point_at_a_node_is_pressed_once_each_time_it_is_passed():
-    _, marks = walked(stops=stops("A", "B", "A"), speed_m_s=1.0, marks_m=np.array([[10.0, 0.0]]))
+    _, marks = walked(stops=stops("A", "B", "A"), speed_m_s=1.0, way_points=at([10.0, 0.0]))
     assert marks.time_us.tolist() == [10_000_000]
+
+
+@pytest.mark.parametrize("level", [-1, 1])
+def test_a_way_point_of_another_level_is_not_pressed(level):
+    _, marks = walked(way_points=at([0.0, 0.0], [2.5, 0.0], level=level))
+    assert len(marks) == 0
+
+
+def test_way_points_one_above_the_other_are_two():
+    nodes = tuple(
+        Node(id=f"{name}{level}", x_m=x_m, y_m=y_m, level=level)
+        for level in (0, 1)
+        for name, x_m, y_m in (("a", 1, 5), ("b", 5, 5), ("c", 5, 9))
+    )
+    edges = tuple(
+        Edge(first=f"{first}{level}", second=f"{second}{level}", branch=branch)
+        for level in (0, 1)
+        for first, second, branch in (("a", "b", "x"), ("b", "c", "y"))
+    )
+    levels = tuple(Level(level=level, bounds=box(0, 0, 10, 10)) for level in (0, 1))
+    venue = Venue(
+        name="two",
+        floor_plan=FloorPlan(levels=levels),
+        beacons=(),
+        graph=AisleGraph(nodes=nodes, edges=edges),
+    )
+    points = way_points(venue)
+    assert points.xy_m.tolist() == [[5, 5], [5, 5]]
+    assert points.level.tolist() == [0, 1]
+
+
+def test_way_points_without_their_levels_are_refused():
+    with pytest.raises(UsageError, match="way points"):
+        WayPoints(xy_m=np.zeros((2, 2)), level=np.zeros(1, np.int16))
 
 
 def test_walkers_share_a_clock_and_do_not_disturb_each_other():
@@ -135,6 +176,6 @@ def test_impossible_pauses_are_refused(pause_s):
 
 
 def test_way_points_of_the_section_are_shelf_ends_and_junctions(section):
-    points = way_points_m(section)
+    points = way_points(section)
     # Nineteen shelf ends in each of three aisles, and two junctions each.
     assert len(points) == 3 * 19 + 3 * 2
