@@ -10,6 +10,7 @@ import numpy as np
 
 NO_EDGE = -1
 CHANNEL_NOT_TOLD = 0
+PROXIMITY_NOT_TOLD = 0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,11 +79,21 @@ class Stream:
 
 _TIME_LIMIT_US = 366 * 24 * 3600 * 1e6
 _MAP_LIMIT_M = 1e5
+LONGEST_STEP_M = 3.0
 _PI_ROUNDED_UP = 3.15
 
 KINDS = (("survey", 0), ("walk", 1))
 STATES = (("standing", 0), ("walking", 1), ("turning", 2))
 FEET = (("left", 0), ("right", 1))
+PROXIMITIES = (("not_told", PROXIMITY_NOT_TOLD), ("immediate", 1), ("near", 2), ("far", 3))
+BEACON_EVENTS = (
+    ("dies", 0),
+    ("reboots", 1),
+    ("returns", 2),
+    ("moves", 3),
+    ("replaced", 4),
+    ("sags", 5),
+)
 FATES = (
     ("received", 0),
     ("out_of_window", 1),
@@ -219,7 +230,7 @@ def _step_columns(whose: str) -> tuple[Column, ...]:
             dtype="float64",
             units="m",
             long_name=f"step length, {whose}",
-            valid_range=(0, 3),
+            valid_range=(0, LONGEST_STEP_M),
             decimals=4,
         ),
         _heading(f"heading of the step, {whose}"),
@@ -242,6 +253,14 @@ RSSI = Stream(
             valid_range=(-127, 20),
         ),
         _CHANNEL,
+        Column(
+            name="proximity",
+            field="proximity",
+            dtype="uint8",
+            units="1",
+            long_name="proximity class, where the phone's system tells one",
+            flags=PROXIMITIES,
+        ),
     ),
 )
 IMU = Stream(
@@ -377,6 +396,28 @@ PACKETS = Stream(
         ),
     ),
 )
+BEACON_HISTORY = Stream(
+    name="beacon_events",
+    group="/truth/beacon_events",
+    row="one thing that happened to a beacon, with what it is like from then on",
+    columns=(
+        _time("time of the event"),
+        _BEACON,
+        Column(
+            name="event",
+            field="event",
+            dtype="uint8",
+            units="1",
+            long_name="what happened",
+            flags=BEACON_EVENTS,
+        ),
+        _metres("x", "x of the beacon from then on"),
+        _metres("y", "y of the beacon from then on"),
+        _metres("z", "height above the level's floor from then on"),
+        _LEVEL,
+        _decibels("power_change", "power from then on, relative to the beacon as built"),
+    ),
+)
 TRACK = Stream(
     name="track",
     group="/track",
@@ -396,6 +437,8 @@ TRACK = Stream(
 
 OBSERVATIONS = (RSSI, IMU, STEPS, MARKS)
 TRUTH = (TRAJECTORY, STEP_TRUTH, PACKETS)
+# What belongs to the whole recording: no walk counts its rows.
+HISTORY = (BEACON_HISTORY,)
 
 
 def _text(name: str, long_name: str) -> Column:

@@ -1,7 +1,7 @@
 """Recorded streams in memory: frozen tables whose fields are the columns of `columns.py`."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -15,6 +15,8 @@ from blesim.units import wrap_angle
 IntArray = NDArray[np.integer[Any]]
 FloatArray = NDArray[np.floating[Any]]
 Selection = slice | NDArray[np.bool_] | NDArray[np.intp]
+# Stands for a column that was not given, whatever the number of rows.
+_NO_PROXIMITY: IntArray = np.empty(0, dtype=np.uint8)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -131,13 +133,23 @@ def _rebuilt(table: type[Table], arrays: list[NDArray[Any]]) -> Table:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Readings(Table):
-    """RSSI readings, in order of time; ``beacon`` counts the beacons of the venue from 0."""
+    """RSSI readings, in order of time; ``beacon`` counts the beacons of the venue from 0.
+
+    Without ``proximity`` no reading tells a proximity class, as most systems do not.
+    """
 
     STREAM: ClassVar[Stream] = columns.RSSI
     time_us: IntArray
     beacon: IntArray
     rssi_dbm: IntArray
     channel: IntArray
+    proximity: IntArray = field(default_factory=lambda: _NO_PROXIMITY)
+
+    def __post_init__(self) -> None:
+        if self.proximity is _NO_PROXIMITY:
+            told = np.full(np.size(self.time_us), columns.PROXIMITY_NOT_TOLD)
+            object.__setattr__(self, "proximity", told)
+        Table.__post_init__(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -205,6 +217,21 @@ class Packets(Table):
     fading_db: FloatArray
     body_loss_db: FloatArray
     power_dbm: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BeaconHistory(Table):
+    """What happened to the beacons while they were heard, and what each is like from then on."""
+
+    STREAM: ClassVar[Stream] = columns.BEACON_HISTORY
+    time_us: IntArray
+    beacon: IntArray
+    event: IntArray
+    x_m: FloatArray
+    y_m: FloatArray
+    z_m: FloatArray
+    level: IntArray
+    power_change_db: FloatArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

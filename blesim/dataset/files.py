@@ -1,14 +1,18 @@
-"""Files that are whole or not there: written beside their target, renamed when finished."""
+"""HDF5 files: new ones that are whole or not there, and our own opened for reading."""
 
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+import re
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from io import FileIO
 from pathlib import Path
 
 import h5py
 
-from blesim.errors import DataError, UsageError, VenueError
+from blesim.errors import DataError, VenueError
 from blesim.recording import SCHEMA_VERSION
+from blesim.whole_file import whole_file, write_all, written
 
 RECORDING = "recording"
 TRACKS = "tracks"
@@ -16,10 +20,80 @@ TRACKS = "tracks"
 _CHUNK_CACHE_BYTES = 2**19
 # What h5py raises on damage, depending on what the damaged bytes meant.
 DAMAGE = (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError, MemoryError)
+# HDF5 says what it could not do, and in brackets why, with the addresses it was at.
+_HDF5_REASON = re.compile(r"(?:Can't|Unable to) [^(]*\(([^():]+)")
+
+
+class Disk:
+    """What HDF5 writes through; it keeps the first fault and goes on as if nothing had happened.
+
+    HDF5 can neither close nor forget a file that it failed to write: the interpreter then crashes
+    at its end. So HDF5 is never told, and the one who writes asks for the fault.
+    """
+
+    def __init__(self, file: FileIO) -> None:
+        self.fault: BaseException | None = None
+        self._file = file
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        """Go to a place."""
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        """Return the place."""
+        return self._file.tell()
+
+    def read(self, size: int = -1) -> bytes:
+        """Read what was written."""
+        return self._file.read(size)
+
+    def readinto(self, buffer: memoryview) -> int:
+        """Read what was written."""
+        return self._file.readinto(buffer)
+
+    def write(self, content: memoryview) -> int:
+        """Write, unless that has failed before."""
+        self._try(lambda: write_all(self._file, content))
+        return len(content)
+
+    def truncate(self, size: int) -> int:
+        """Set the length, unless writing has failed before."""
+        self._try(lambda: self._file.truncate(size))
+        return size
+
+    def flush(self) -> None:
+        """Do nothing: nothing is held back here."""
+
+    def _try(self, change: Callable[[], object]) -> None:
+        if self.fault is not None:
+            return
+        try:
+            change()
+        except BaseException as fault:  # a signal's too: raised through HDF5, it would be lost
+            self.fault = fault
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Draft:
+    """An HDF5 file that is being written, and what is to become of it."""
+
+    path: Path
+    file: h5py.File
+    disk: Disk
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """A block that writes; a failing disk is a `DataError` that names the file."""
+        with written(self.path):
+            try:
+                yield
+            finally:
+                if self.disk.fault is not None:
+                    raise self.disk.fault
 
 
 @contextmanager
-def created(path: Path) -> Iterator[h5py.File]:
+def created(path: Path) -> Iterator[Draft]:
     """An empty HDF5 file that appears under its name when the block ends well, or never.
 
     Raises
@@ -29,30 +103,23 @@ def created(path: Path) -> Iterator[h5py.File]:
     DataError
         If the disk is full or fails.
     """
-    _refuse_target(path)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    file = _create(path, part)
-    try:
-        yield file
-        with written(path):
-            file.close()
-            _sync(part)
-            part.replace(path)
-            _sync(path.parent)
-    except BaseException:
-        with suppress(OSError, RuntimeError):
-            file.close()
-        part.unlink(missing_ok=True)
-        raise
-
-
-@contextmanager
-def written(path: Path) -> Iterator[None]:
-    """A block in which a failing disk is a `DataError` that names the file."""
-    try:
-        yield
-    except (OSError, RuntimeError) as fault:
-        raise DataError(f"{path}: cannot be written: {first_line(fault)}") from fault
+    with whole_file(path) as raw:
+        disk = Disk(raw)
+        # No time stamps anywhere: the same content must give the same bytes.
+        file = h5py.File(
+            disk,
+            "w",
+            libver=("v110", "v110"),
+            track_order=True,
+            track_times=False,
+            rdcc_nbytes=_CHUNK_CACHE_BYTES,
+        )
+        draft = Draft(path=path, file=file, disk=disk)
+        try:
+            yield draft
+        finally:
+            with draft.writing():
+                file.close()
 
 
 @contextmanager
@@ -81,36 +148,6 @@ def opened(path: Path, content: str) -> Iterator[h5py.File]:
         raise DataError(f"{path}: damaged ({first_line(fault)}); make it again") from fault
 
 
-def _refuse_target(path: Path) -> None:
-    if path.is_dir():
-        raise UsageError(f"{path}: is a directory; give the name of a file")
-    if not path.parent.is_dir():
-        raise UsageError(f"{path}: there is no directory {path.parent}; make it first")
-
-
-def _create(path: Path, part: Path) -> h5py.File:
-    try:
-        # No time stamps anywhere: the same content must give the same bytes.
-        return h5py.File(
-            part,
-            "w",
-            libver=("v110", "v110"),
-            track_order=True,
-            track_times=False,
-            rdcc_nbytes=_CHUNK_CACHE_BYTES,
-        )
-    except OSError as fault:
-        raise UsageError(f"{path}: cannot be created: {first_line(fault)}") from fault
-
-
-def _sync(path: Path) -> None:
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
-
-
 def _open(path: Path) -> h5py.File:
     if path.is_dir():
         raise DataError("is a directory; give the name of a file")
@@ -137,7 +174,12 @@ def _refuse_foreign(file: h5py.File, content: str) -> None:
 
 
 def first_line(fault: BaseException) -> str:
-    """First line of what an exception has to say."""
+    """What an exception has to say, in one line and without the insides of HDF5."""
+    if isinstance(fault, OSError) and fault.errno:
+        return os.strerror(fault.errno)
     # A KeyError shows its message in quotes.
     text = str(fault.args[0]) if isinstance(fault, KeyError) and fault.args else str(fault)
+    reason = _HDF5_REASON.match(text)
+    if reason is not None:
+        text = reason[1]
     return text.splitlines()[0] if text else type(fault).__name__

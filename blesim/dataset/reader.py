@@ -7,9 +7,10 @@ from types import MappingProxyType
 from typing import TypeVar
 
 import h5py
+import numpy as np
 
 from blesim import columns
-from blesim.columns import Stream
+from blesim.columns import NO_EDGE, Stream
 from blesim.dataset.columns_in import (
     first_step_back,
     read_column,
@@ -23,6 +24,7 @@ from blesim.dataset.provenance import read_provenance
 from blesim.errors import DataError
 from blesim.recording import Observations, Recording, Truth, Walk, WalkKind, WalkTruth
 from blesim.tables import (
+    BeaconHistory,
     Imu,
     Marks,
     Packets,
@@ -70,13 +72,17 @@ def read_truth(path: Path) -> Truth:
     Raises
     ------
     DataError
-        As for `read_recording`, and if nobody recorded the truth of any walk.
+        As for `read_recording`, and if nobody recorded the truth of any walk, or a walk leads
+        nowhere: scores rest on it.
     """
     with opened(path, RECORDING) as file:
         names = read_texts(file, columns.WALKS, columns.WALKS.columns[0])
+        venue = _venue(file, "built")
         trajectories = read_tables(file, columns.WALKS, Trajectory)
         if names and not any(len(trajectory) for trajectory in trajectories):
             raise DataError("holds no truth; nothing can be scored against it")
+        for name, trajectory in zip(names, trajectories, strict=True):
+            _refuse_bad_places(name, trajectory, venue)
         steps = read_tables(file, columns.WALKS, StepTruth)
         packets = read_tables(file, columns.WALKS, Packets)
         walks = {
@@ -85,7 +91,11 @@ def read_truth(path: Path) -> Truth:
                 names, trajectories, steps, packets, strict=True
             )
         }
-        return Truth(venue=_venue(file, "built"), walks=MappingProxyType(walks))
+        return Truth(
+            venue=venue,
+            walks=MappingProxyType(walks),
+            beacon_events=_history(file),
+        )
 
 
 def read_tables(file: h5py.File, counting: Stream, table: type[AnyTable]) -> list[AnyTable]:
@@ -118,6 +128,27 @@ def read_tables(file: h5py.File, counting: Stream, table: type[AnyTable]) -> lis
         together.rows(slice(start, end)) if end > start else empty
         for start, end in pairwise(starts.tolist())
     ]
+
+
+def _refuse_bad_places(walk: str, trajectory: Trajectory, venue: Venue) -> None:
+    group = trajectory.STREAM.group
+    for column in trajectory.STREAM.columns:
+        if not column.missing and not np.all(np.isfinite(trajectory[column])):
+            raise DataError(f"walk '{walk}': {group}/{column.name} is not finite everywhere")
+    edges = 0 if venue.graph is None else len(venue.graph.edges)
+    on_edge = trajectory.edge != NO_EDGE
+    if np.any((trajectory.edge < NO_EDGE) | (trajectory.edge >= edges)):
+        raise DataError(f"walk '{walk}': {group}/edge names an edge that the aisle graph lacks")
+    if not np.all(np.isfinite(trajectory.offset_m[on_edge])):
+        raise DataError(f"walk '{walk}': {group}/offset is not known on every edge")
+
+
+def _history(file: h5py.File) -> BeaconHistory:
+    stream = BeaconHistory.STREAM
+    whole = read_stream(file, stream)
+    return BeaconHistory(
+        **{column.field: values for column, values in zip(stream.columns, whole, strict=True)}
+    )
 
 
 def _venue(file: h5py.File, which: str) -> Venue:

@@ -16,7 +16,8 @@ A recording is one HDF5 file (schema version {SCHEMA_VERSION},
 {CONVENTIONS} contiguous ragged arrays) that plain h5py, xarray, netCDF4 and MATLAB open. Each
 stream is one flat table for all walks: the rows of the first walk, then those of the second, and
 so on; `/walks` holds one row a walk and says in `<stream>_row_size` how many rows of each stream
-are its own. Times ascend within a walk. A stream that nobody recorded has no rows.
+are its own; `/truth/beacon_events` belongs to all of them. Times ascend within a walk. A stream
+that nobody recorded has no rows.
 
 ```python
 rssi = xarray.open_dataset("a.h5", group="rssi", decode_timedelta=False)
@@ -46,7 +47,7 @@ What estimators made of a recording, under the same rules. Root attributes: `Con
 
 def schema_page() -> str:
     """Markdown of every group and column of recordings and tracks."""
-    recording = (*columns.STATIC, *RECORDED)
+    recording = (*columns.STATIC, *RECORDED, *columns.HISTORY)
     parts = [_INTRODUCTION, *map(_section, recording), _TRACKS]
     parts += map(_section, (columns.RUNS, columns.TRACK))
     return "\n".join(parts)

@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from blesim import columns
 from blesim.dataset.columns_in import read_texts
-from blesim.dataset.files import TRACKS, created, opened, written
+from blesim.dataset.files import TRACKS, created, opened
 from blesim.dataset.layout import write_table
 from blesim.dataset.provenance import packages, read_root, write_root
 from blesim.dataset.reader import read_tables
@@ -62,12 +62,12 @@ def write_tracks(path: Path, tracks: TrackSet) -> None:
     found = [result if isinstance(result, Track) else Track.empty() for result in results]
     failures = [_reason(result) if isinstance(result, Failure) else "" for result in results]
     texts = ("estimated tracks", tracks.recording_sha256, packages())
-    with created(path) as file, written(path):
-        write_root(file, TRACKS, dict(zip(_ROOT, texts, strict=True)))
+    with created(path) as draft, draft.writing():
+        write_root(draft.file, TRACKS, dict(zip(_ROOT, texts, strict=True)))
         values = [[label for label, _ in tracks.runs], [walk for _, walk in tracks.runs], failures]
         sizes = [(columns.TRACK, [len(track) for track in found])]
-        write_table(file, columns.RUNS, values, sizes)
-        sink = Sink(file, columns.TRACK)
+        write_table(draft.file, columns.RUNS, values, sizes)
+        sink = Sink(draft.file, columns.TRACK)
         for track in found:
             sink.append(track)
         sink.finish()

@@ -80,7 +80,7 @@ def _form(file: h5py.File) -> Iterator[str]:
 
 def _streams(file: h5py.File) -> list[Stream]:
     graph = [stream for stream in (columns.NODES, columns.EDGES) if stream.group in file]
-    return [*graph, columns.BEACONS, columns.WALKS, *RECORDED]
+    return [*graph, columns.BEACONS, columns.WALKS, *RECORDED, *columns.HISTORY]
 
 
 def _table(file: h5py.File, stream: Stream) -> Iterator[str]:
@@ -165,6 +165,7 @@ def _contents(file: h5py.File) -> Iterator[str]:
         row = first_step_back(time_us, found)
         if row is not None:
             yield f"{stream.group}/time goes backwards at row {row}"
+    yield from _history(file)
     yield from _rows(file)
     if len(starts) == len(RECORDED):
         yield from _coverage(file, starts)
@@ -175,7 +176,7 @@ def _map_tables(file: h5py.File, venue: Venue) -> Iterator[str]:
     missing = {stream.group for stream in _streams(file)} ^ {
         stream.group for stream, _ in [*tables, (columns.WALKS, [])]
     }
-    if missing - {stream.group for stream in RECORDED}:
+    if missing - {stream.group for stream in (*RECORDED, *columns.HISTORY)}:
         yield "the aisle graph is in only one of /venue/surveyed and /venue/edges"
         return
     for stream, values in tables:
@@ -193,6 +194,14 @@ def _agrees(file: h5py.File, stream: Stream, column: Column, expected: list[Any]
     return bool(np.allclose(found, expected, rtol=0.0, atol=1e-6))
 
 
+def _history(file: h5py.File) -> Iterator[str]:
+    for stream in columns.HISTORY:
+        time_us = read_column(file, stream, stream.columns[0])
+        row = first_step_back(time_us, np.zeros(1, np.int64))
+        if row is not None:
+            yield f"{stream.group}/time goes backwards at row {row}"
+
+
 def _names(file: h5py.File) -> Iterator[str]:
     names = read_texts(file, columns.WALKS, columns.WALKS.columns[0])
     if len(set(names)) != len(names):
@@ -206,6 +215,7 @@ def _rows(file: h5py.File) -> Iterator[str]:
     for stream, name, rows in (
         (columns.RSSI, "beacon", len(surveyed.beacons)),
         (columns.PACKETS, "beacon", len(built.beacons)),
+        (columns.BEACON_HISTORY, "beacon", len(built.beacons)),
         (columns.TRAJECTORY, "edge", edges),
     ):
         values = file[f"{stream.group}/{name}"][()]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from blesim import columns
 from blesim.columns import Stream
-from blesim.dataset.files import RECORDING, created, written
+from blesim.dataset.files import RECORDING, created
 from blesim.dataset.layout import (
     CHUNK_ROWS,
     RECORDED,
@@ -27,7 +27,7 @@ from blesim.dataset.provenance import write_provenance
 from blesim.dataset.static_tables import venue_tables, walk_values
 from blesim.errors import DataError
 from blesim.recording import Observations, Provenance, Recording, Truth, Walk, WalkTruth
-from blesim.tables import Table
+from blesim.tables import BeaconHistory, Table
 from blesim.venue.geojson import to_geojson
 from blesim.venue.venue import Venue
 
@@ -91,6 +91,8 @@ class RecordingWriter:
         As an estimator may know it, and as it really is.
     provenance : Provenance
         What it shows and where it comes from.
+    beacon_events : BeaconHistory or None
+        What befell the beacons as built, if anything did.
 
     Raises
     ------
@@ -101,12 +103,19 @@ class RecordingWriter:
     """
 
     def __init__(
-        self, path: Path, *, venue_surveyed: Venue, venue_built: Venue, provenance: Provenance
+        self,
+        path: Path,
+        *,
+        venue_surveyed: Venue,
+        venue_built: Venue,
+        provenance: Provenance,
+        beacon_events: BeaconHistory | None = None,
     ) -> None:
         self._path = path
         self._surveyed = venue_surveyed
         self._built = venue_built
         self._provenance = provenance
+        self._history = beacon_events or BeaconHistory.empty()
         self._stack = ExitStack()
         self._walks: dict[str, Walk] = {}
         self._rows: list[list[int]] = []
@@ -114,8 +123,8 @@ class RecordingWriter:
     def __enter__(self) -> Self:
         """Begin a temporary file beside the target."""
         with ExitStack() as stack:
-            self._file = stack.enter_context(created(self._path))
-            with written(self._path):
+            self._draft = stack.enter_context(created(self._path))
+            with self._draft.writing():
                 self._begin()
             self._stack = stack.pop_all()
         return self
@@ -131,7 +140,7 @@ class RecordingWriter:
             # Raised in here, so that the temporary file goes away with it.
             if fault is not None:
                 raise fault
-            with written(self._path):
+            with self._draft.writing():
                 self._complete()
 
     def append(self, walk: Walk, truth: WalkTruth | None = None) -> None:
@@ -144,7 +153,7 @@ class RecordingWriter:
         """
         self._refuse(walk)
         tables = (*walk.observations.tables(), *(truth or _UNKNOWN).tables())
-        with written(self._path):
+        with self._draft.writing():
             for sink, table in zip(self._sinks, tables, strict=True):
                 sink.append(table)
         self._walks[walk.name] = replace(walk, observations=_NOTHING)
@@ -161,22 +170,29 @@ class RecordingWriter:
             )
 
     def _begin(self) -> None:
-        write_provenance(self._file, RECORDING, self._provenance)
-        venue = group_at(self._file, "/venue")
+        file = self._draft.file
+        write_provenance(file, RECORDING, self._provenance)
+        venue = group_at(file, "/venue")
         create_text(venue, "built", to_geojson(self._built))
         create_text(venue, "surveyed", to_geojson(self._surveyed))
         for stream, values in venue_tables(self._surveyed):
-            write_table(self._file, stream, values)
+            write_table(file, stream, values)
         # Before the streams, so that the groups have the order in which one reads them.
-        group_at(self._file, columns.WALKS.group)
-        self._sinks = [Sink(self._file, stream) for stream in RECORDED]
+        group_at(file, columns.WALKS.group)
+        self._sinks = [Sink(file, stream) for stream in RECORDED]
+        write_table(file, columns.BEACON_HISTORY, _values(self._history))
 
     def _complete(self) -> None:
         sizes = zip(*self._rows, strict=True) if self._rows else [()] * len(RECORDED)
         row_sizes = list(zip(RECORDED, sizes, strict=True))
-        write_table(self._file, columns.WALKS, walk_values(list(self._walks.values())), row_sizes)
+        walks = walk_values(list(self._walks.values()))
+        write_table(self._draft.file, columns.WALKS, walks, row_sizes)
         for sink in self._sinks:
             sink.finish()
+
+
+def _values(table: Table) -> list[list[Any]]:
+    return [values.tolist() for values in table.arrays()]
 
 
 def write_recording(path: Path, recording: Recording, truth: Truth | None = None) -> None:
@@ -196,6 +212,7 @@ def write_recording(path: Path, recording: Recording, truth: Truth | None = None
         venue_surveyed=recording.venue,
         venue_built=truth.venue if truth is not None else recording.venue,
         provenance=recording.provenance,
+        beacon_events=truth.beacon_events if truth is not None else None,
     )
     with writer:
         for walk in recording.walks:

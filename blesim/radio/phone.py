@@ -1,62 +1,103 @@
 """A phone: how its radio scans, how it measures, and what its system tells an application."""
 
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from blesim.radio.delivery import Delivery
 from blesim.settings import Settings
 from blesim.venue.beacons import CHANNELS
 
 RSSI_RANGE_DBM = (-127, 20)
 
+Mode = Literal[
+    "android-2014-low-power",
+    "android-2014-balanced",
+    "android-2014-low-latency",
+    "android-2016-low-power",
+    "android-2016-balanced",
+    "android-2016-low-latency",
+    "android-2023-low-power",
+    "android-2023-balanced",
+    "android-2023-low-latency",
+]
+# Window and interval in ms, from the sources of Android (AOSP, ScanManager.java): versions 5 and 6,
+# 7 to 12, and the current one.
+SCAN_MODES: Mapping[Mode, tuple[float, float]] = {
+    "android-2014-low-power": (500.0, 5000.0),
+    "android-2014-balanced": (2000.0, 5000.0),
+    "android-2014-low-latency": (5000.0, 5000.0),
+    "android-2016-low-power": (512.0, 5120.0),
+    "android-2016-balanced": (1024.0, 4096.0),
+    "android-2016-low-latency": (4096.0, 4096.0),
+    "android-2023-low-power": (140.0, 1400.0),
+    "android-2023-balanced": (183.0, 730.0),
+    "android-2023-low-latency": (100.0, 100.0),
+}
+Gain = Annotated[float, Field(ge=-30, le=30)]
+_USUAL: Mode = "android-2016-low-latency"
+
 
 class Scanner(Settings):
     """A scanner that listens to one advertising channel at a time: 37, 38, 39, 37 and so on.
 
+    Without any setting it is Android's low latency mode of versions 7 to 12.
+
     Attributes
     ----------
-    interval_ms, window_ms : float
-        One channel is scanned for the window at the start of each interval. 4096/4096 is
-        Android's low latency mode of versions 7 to 12 (AOSP). [ms]
+    mode : str or None
+        A named pair of window and interval, a key of `SCAN_MODES`; or else the numbers:
+    interval_ms, window_ms : float or None
+        One channel is scanned for the window at the start of each interval; without a window, for
+        the whole interval. [ms]
+    all_channels : bool
+        Whether it hears all three channels at once, as a dedicated receiver with three radios does.
     """
 
-    interval_ms: float = Field(default=4096.0, ge=2.5, le=40960)
-    window_ms: float = Field(default=4096.0, ge=2.5, le=40960)
+    mode: Mode | None = None
+    interval_ms: float | None = Field(default=None, ge=2.5, le=40960)
+    window_ms: float | None = Field(default=None, ge=2.5, le=40960)
+    all_channels: bool = False
+
+    @model_validator(mode="after")
+    def _one_timing(self) -> "Scanner":
+        if self.mode is not None and (self.interval_ms, self.window_ms) != (None, None):
+            raise ValueError("give either 'mode' or 'interval_ms' and 'window_ms'")
+        if self.window_ms is not None and self.interval_ms is None:
+            raise ValueError("give 'interval_ms' together with 'window_ms'")
+        return self
 
     @model_validator(mode="after")
     def _window_fits(self) -> "Scanner":
-        if self.window_ms > self.interval_ms:
+        if self.window_us > self.interval_us:
             raise ValueError(
                 f"window_ms {self.window_ms:g} is longer than interval_ms {self.interval_ms:g}"
             )
         return self
 
     @property
+    def interval_us(self) -> int:
+        """From the start of one scan to that of the next, on the next channel. [us]."""
+        if self.interval_ms is not None:
+            return round(self.interval_ms * 1000)
+        return round(SCAN_MODES[self.mode or _USUAL][1] * 1000)
+
+    @property
+    def window_us(self) -> int:
+        """How long each scan listens. [us]."""
+        if self.window_ms is not None:
+            return round(self.window_ms * 1000)
+        if self.interval_ms is not None:
+            return self.interval_us
+        return round(SCAN_MODES[self.mode or _USUAL][0] * 1000)
+
+    @property
     def cycle_us(self) -> int:
         """How long it takes until the same channel comes again. [us]."""
-        return len(CHANNELS) * round(self.interval_ms * 1000)
-
-    def listens(
-        self, since_start_us: NDArray[np.int64], duration_us: int
-    ) -> tuple[NDArray[np.bool_], NDArray[np.int64]]:
-        """Whether packets fall wholly into a scan window, and which channel is being scanned.
-
-        Parameters
-        ----------
-        since_start_us : ndarray of int64, (n,)
-            Starts of packets, counted from the start of a scan on channel 37. [us]
-        duration_us : int
-            Of a packet on air. [us]
-
-        Returns
-        -------
-        in_window : ndarray of bool, (n,)
-        channel : ndarray of int64, (n,)
-            37, 38 or 39.
-        """
-        interval_us, window_us = round(self.interval_ms * 1000), round(self.window_ms * 1000)
-        number, within_us = np.divmod(since_start_us, interval_us)
-        return within_us + duration_us <= window_us, CHANNELS[0] + number % len(CHANNELS)
+        return len(CHANNELS) * self.interval_us
 
 
 class Receiver(Settings):
@@ -73,15 +114,15 @@ class Receiver(Settings):
     sensitivity_dbm : float
         Power at which half of the packets that are not lost otherwise arrive. [dBm]
     edge_db : float
-        Scale of the logistic edge. With 2.3 and a sensitivity of -95, reception is 0.88, 0.78,
-        0.64 and 0.18 at -87, -91, -93 and -98.5 dBm, where 0.86, 0.79, 0.65 and 0.13 (below -98)
-        were measured. [dB]
+        Scale of the logistic edge. With 2.3, a sensitivity of -95 and the random loss, reception is
+        0.88, 0.78, 0.64 and 0.16 at -87, -91, -93 and -98.5 dBm, where 0.86, 0.79, 0.65 and 0.13
+        (below -98) were measured. [dB]
     random_loss : float
         Share of packets lost even when strong: 0.09 measured. [-]
     """
 
     offset_db: float = Field(default=0.0, ge=-30, le=30)
-    channel_gain_db: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    channel_gain_db: tuple[Gain, Gain, Gain] = (0.0, 0.0, 0.0)
     noise_db: float = Field(default=0.4, ge=0, le=10)
     sensitivity_dbm: float = Field(default=-95.0, ge=-120, le=-40)
     edge_db: float = Field(default=2.3, gt=0, le=20)
@@ -107,13 +148,20 @@ class Phone(Settings):
     ----------
     scanner, receiver : Scanner, Receiver
         Its radio.
+    delivery : Delivery
+        What its system hands to the application.
     height_m : float
         At which it is carried: about 1 m at the waist. [m]
+    held : bool
+        Whether a person carries it, whose body shadows and sways; a tripod does neither.
     tells_channel : bool
-        Whether the system tells applications the channel of a packet; Android and iOS never do.
+        Whether the application learns the channel of a packet. Android and iOS never tell; some
+        beacons put it into the payload.
     """
 
     scanner: Scanner = Scanner()
     receiver: Receiver = Receiver()
+    delivery: Delivery = Delivery()
     height_m: float = Field(default=1.0, ge=0, le=3)
+    held: bool = True
     tells_channel: bool = False

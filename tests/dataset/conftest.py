@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import shapely
 
-from blesim.columns import IMU
+from blesim.columns import BEACON_EVENTS, IMU
 from blesim.recording import (
     Observations,
     Provenance,
@@ -17,7 +17,16 @@ from blesim.recording import (
     WalkKind,
     WalkTruth,
 )
-from blesim.tables import Imu, Marks, Packets, Readings, Steps, StepTruth, Trajectory
+from blesim.tables import (
+    BeaconHistory,
+    Imu,
+    Marks,
+    Packets,
+    Readings,
+    Steps,
+    StepTruth,
+    Trajectory,
+)
 from blesim.venue.beacons import Beacon
 from blesim.venue.floor_plan import FloorPlan, Level, Obstacle
 from blesim.venue.graph import AisleGraph, Edge, Node
@@ -73,6 +82,7 @@ def _observations(rng: np.random.Generator, count: int) -> Observations:
             beacon=rng.integers(0, 3, count),
             rssi_dbm=rng.integers(-100, -50, count),
             channel=rng.choice([0, 37, 38, 39], count),
+            proximity=rng.integers(0, 4, count),
         ),
         imu=Imu(time_us=time_us, **axes),
         steps=Steps(
@@ -121,6 +131,16 @@ def truth(recording: Recording, venue: Venue) -> Truth:
         venue=venue.with_beacons((*venue.beacons, _beacon(4, 17.0))),
         walks=MappingProxyType(
             {walk.name: _truth(rng, walk.observations) for walk in recording.walks}
+        ),
+        beacon_events=BeaconHistory(
+            time_us=[5, 5, 900],
+            beacon=[0, 3, 0],
+            event=[dict(BEACON_EVENTS)[name] for name in ("sags", "moves", "dies")],
+            x_m=[4.0, 17.5, 4.0],
+            y_m=[2.0, 2.0, 2.0],
+            z_m=[1.5, 1.5, 1.5],
+            level=[0, 0, 0],
+            power_change_db=[-3.0, 0.0, -3.0],
         ),
     )
 

@@ -86,7 +86,7 @@ def test_version_of_tomorrow(tmp_path: Path, whole: bytes, read: object) -> None
     path.write_bytes(whole)
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = "2.0"
-    assert "schema version 2.0, but this blesim reads 1.0" in _message(read, path)
+    assert "schema version 2.0, but this blesim reads 1.1" in _message(read, path)
 
 
 @pytest.mark.parametrize("read", READERS)
@@ -95,6 +95,69 @@ def test_cut_short_anywhere(tmp_path: Path, whole: bytes, read: object) -> None:
     for length in np.linspace(0, len(whole) - 1, 60).astype(int).tolist():
         path.write_bytes(whole[:length])
         _message(read, path)
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "words"),
+    [
+        ("edge", 999, "edge names an edge that the aisle graph lacks"),
+        ("edge", -7, "edge names an edge that the aisle graph lacks"),
+        ("x", np.nan, "x is not finite everywhere"),
+        ("speed", np.inf, "speed is not finite everywhere"),
+        ("offset", np.nan, "offset is not known on every edge"),
+    ],
+)
+def test_truth_that_leads_nowhere(
+    tmp_path: Path, whole: bytes, column: str, value: float, words: str
+) -> None:
+    path = tmp_path / "a.h5"
+    path.write_bytes(whole)
+    with h5py.File(path, "r+") as file:
+        file[f"truth/trajectory/{column}"][1] = value
+    assert words in _message(read_truth, path)
+
+
+def test_reasons_are_short(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "a.h5"
+    path.write_bytes(whole[: len(whole) // 2])
+    reason = "damaged (truncated file); make it again"
+    assert _message(read_recording, path) == f"{path}: {reason}"
+
+
+FULL = """
+import resource, signal, sys
+from pathlib import Path
+from blesim.dataset.reader import read_recording
+from blesim.dataset.writer import write_recording
+from blesim.errors import DataError
+
+recording = read_recording(Path(sys.argv[1]))
+# Beyond the limit writing fails as it does on a full disk.
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]),) * 2)
+try:
+    write_recording(Path(sys.argv[2]), recording)
+except DataError as fault:
+    print(fault)
+"""
+
+
+@pytest.mark.parametrize("room_bytes", [1, 5_000, 60_000])
+def test_a_full_disk_is_one_line_and_leaves_nothing(
+    tmp_path: Path, whole: bytes, room_bytes: int
+) -> None:
+    source, target = tmp_path / "a.h5", tmp_path / "new" / "b.h5"
+    source.write_bytes(whole)
+    target.parent.mkdir()
+    ended = subprocess.run(
+        [sys.executable, "-c", FULL, source, target, str(room_bytes)],
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout == f"{target}: cannot be written: File too large\n"
+    assert list(target.parent.iterdir()) == []
 
 
 def _unharmed(path: Path, recording: Recording, truth: Truth) -> bool:

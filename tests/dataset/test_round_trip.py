@@ -155,8 +155,12 @@ def walks(draw: st.DrawFn) -> tuple[Walk, WalkTruth]:
         marks=draw(tables(Marks)),
     )
     walk = Walk(name=draw(text), walker=draw(text), phone=draw(text), observations=observations)
+    walked = draw(tables(Trajectory))
     truth = WalkTruth(
-        trajectory=draw(tables(Trajectory)),
+        # The venue has one edge; whoever is on it is somewhere on it.
+        trajectory=replace(
+            walked, edge=np.where(np.isnan(walked.offset_m), -1, np.minimum(walked.edge, 0))
+        ),
         steps=draw(tables(StepTruth)),
         packets=draw(tables(Packets)),
     )

@@ -13,7 +13,8 @@ def test_the_page_in_the_package_is_up_to_date() -> None:
 
 def test_every_column_is_on_the_page() -> None:
     page = schema_page()
-    streams = (*columns.STATIC, *columns.OBSERVATIONS, *columns.TRUTH, columns.TRACK, columns.RUNS)
+    recorded = (*columns.OBSERVATIONS, *columns.TRUTH, *columns.HISTORY)
+    streams = (*columns.STATIC, *recorded, columns.TRACK, columns.RUNS)
     for stream in streams:
         _, section = page.split(f"## `{stream.group}`\n")
         section = section.split("\n## ")[0]

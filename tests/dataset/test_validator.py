@@ -74,6 +74,11 @@ def detached(file: h5py.File) -> None:
 
 
 SOWN = {
+    "history backwards": (put("truth/beacon_events/time", 0, 6), "/truth/beacon_events/time goes"),
+    "unknown event": (put("truth/beacon_events/event", 0, 9), "none of its flag values"),
+    "event of no beacon": (put("truth/beacon_events/beacon", 0, 4), "there are only 4"),
+    "no history": (gone("truth/beacon_events"), "/truth/beacon_events/time is missing"),
+    "unknown proximity": (put("rssi/proximity", 0, 7), "none of its flag values"),
     "missing column": (gone("rssi/channel"), "/rssi/channel is missing"),
     "missing group": (gone("truth/steps"), "/truth/steps/time is missing"),
     "missing text": (gone("venue/built"), "/venue/built is missing"),
@@ -131,6 +136,11 @@ UNREAD = {
     "edge",
     "shelf",
     "coverage",
+    "history backwards",
+    "unknown event",
+    "event of no beacon",
+    "no history",
+    "unknown proximity",
 }
 
 

@@ -3,13 +3,15 @@ import pytest
 from scipy import stats
 
 from blesim.radio.advertising import Advertising, event_times_us
+from blesim.radio.life import simulate_life
 
 SEED = 11
 HOUR_US = 3_600_000_000
 
 
 def times_us(beacon, seed=SEED, until_us=HOUR_US, **settings):
-    return event_times_us(beacon, Advertising(**settings), seed, until_us)
+    (spell,) = simulate_life([beacon], (), until_us).spells
+    return event_times_us(spell, beacon.id, Advertising(**settings), seed, until_us)
 
 
 def test_gaps_are_the_interval_and_a_uniform_delay(section):
@@ -51,4 +53,4 @@ def test_a_longer_simulation_begins_alike(section):
 
 
 def test_nothing_is_sent_in_no_time(section):
-    assert len(times_us(section.beacons[0], until_us=0)) == 0
+    assert len(times_us(section.beacons[0], until_us=1)) == 0

@@ -2,27 +2,52 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from blesim.radio.phone import Receiver, Scanner
-
-
-def test_scanner_listens_to_one_channel_after_the_other():
-    scanner = Scanner(interval_ms=100, window_ms=60)
-    in_window, channel = scanner.listens(
-        np.array([0, 59_632, 59_633, 100_000, 250_000, 300_000]), 368
-    )
-    assert in_window.tolist() == [True, True, False, True, True, True]
-    assert channel.tolist() == [37, 37, 37, 38, 39, 37]
-
-
-def test_duty_cycle_is_window_over_interval():
-    scanner = Scanner(interval_ms=5120, window_ms=512)
-    in_window, _ = scanner.listens(np.arange(0, 60_000_000, 997), 0)
-    assert in_window.mean() == pytest.approx(0.1, abs=0.003)
+from blesim.radio.phone import SCAN_MODES, Receiver, Scanner
 
 
 def test_window_longer_than_its_interval_is_refused():
     with pytest.raises(ValidationError, match="window_ms 200 is longer than interval_ms 100"):
         Scanner(interval_ms=100, window_ms=200)
+
+
+@pytest.mark.parametrize(
+    ("mode", "window_us", "interval_us"),
+    # Android Open Source Project, ScanManager: Android 5, 7 and the current one.
+    [
+        ("android-2014-low-power", 500_000, 5_000_000),
+        ("android-2014-low-latency", 5_000_000, 5_000_000),
+        ("android-2016-balanced", 1_024_000, 4_096_000),
+        ("android-2023-low-power", 140_000, 1_400_000),
+        ("android-2023-balanced", 183_000, 730_000),
+        ("android-2023-low-latency", 100_000, 100_000),
+    ],
+)
+def test_modes_have_the_times_of_their_source(mode, window_us, interval_us):
+    scanner = Scanner(mode=mode)
+    assert (scanner.window_us, scanner.interval_us) == (window_us, interval_us)
+    assert scanner.cycle_us == 3 * interval_us
+
+
+def test_every_mode_is_a_scanner_that_can_be():
+    assert all(Scanner(mode=mode).window_us > 0 for mode in SCAN_MODES)
+
+
+def test_without_setting_it_is_low_latency_and_without_window_it_never_pauses():
+    assert (Scanner().window_us, Scanner().interval_us) == (4_096_000, 4_096_000)
+    assert Scanner(interval_ms=30.0).window_us == 30_000
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"mode": "android-2023-balanced", "window_ms": 50.0}, "either 'mode' or 'interval_ms'"),
+        ({"window_ms": 50.0}, "give 'interval_ms' together with 'window_ms'"),
+        ({"mode": "android-1999"}, "android-2023-low-latency"),
+    ],
+)
+def test_a_timing_is_given_once_and_whole(settings, message):
+    with pytest.raises(ValidationError, match=message):
+        Scanner(**settings)
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,8 @@ from types import MappingProxyType
 
 from blesim.dataset.exchange.imported import Imported
 from blesim.dataset.exchange.philotuxo import read_philotuxo
+from blesim.dataset.exchange.uji_library import read_uji_library
 
 IMPORTERS: Mapping[str, Callable[[Path], Imported]] = MappingProxyType(
-    {"philotuxo": read_philotuxo}
+    {"philotuxo": read_philotuxo, "uji_library": read_uji_library}
 )

@@ -69,14 +69,9 @@ def read_philotuxo(path: Path) -> Imported:
             surveys = read_surveys(file, name.replace("_", " "), venue.beacon_row)
             found += surveys.walks
             glitches += surveys.glitches
-    return _imported(
-        venue,
-        found,
-        (
-            f"left out: {glitches} readings above 0 dBm",
-            f"left out: {unreadable} lines that cannot be read",
-        ),
-    )
+    counts = {"readings above 0 dBm": glitches, "lines that cannot be read": unreadable}
+    report = tuple(f"left out: {count} {what}" for what, count in counts.items() if count)
+    return _imported(venue, found, report)
 
 
 def _imported(

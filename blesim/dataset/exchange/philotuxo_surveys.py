@@ -68,18 +68,26 @@ def read_surveys(path: Path, split: str, row_of_alias: Mapping[str, int]) -> Sur
 
 def _packets(path: Path, row_of_alias: Mapping[str, int]) -> _Packets:
     try:
-        with np.load(path) as archive:
-            return _sorted(dict(archive), row_of_alias)
+        return _sorted(_arrays(path), row_of_alias)
     except (
         OSError,
         EOFError,
         KeyError,
         IndexError,
+        TypeError,
         ValueError,
         zipfile.BadZipFile,
         zlib.error,
     ) as fault:
         raise DataError(f"{path}: damaged, or not of the data set ({fault})") from fault
+
+
+def _arrays(path: Path) -> dict[str, NDArray[Any]]:
+    loaded = np.load(path)
+    if not isinstance(loaded, np.lib.npyio.NpzFile):
+        raise ValueError("one array, where an archive of several is needed")
+    with loaded:
+        return dict(loaded)
 
 
 def _sorted(arrays: dict[str, NDArray[Any]], row_of_alias: Mapping[str, int]) -> _Packets:

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -19,10 +18,14 @@ _FIELDS = 16
 _SUFFIX = "_all_sensors"
 # Slower than this, the ground truth's own jitter looks like walking.
 _STANDING_M_S = 0.1
+# Far in the future, and still to be counted in microseconds.
+_LAST_UNIX_S = 1e11
+_MAP_LIMIT_M = 1e5
+_LONGEST_S = 24 * 3600
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Track:
+class MovingTrack:
     """One track, and how many lines of its file were left out."""
 
     walk: Walk
@@ -31,7 +34,7 @@ class Track:
     unreadable: int
 
 
-def read_track(path: Path, row_of_mac: Mapping[str, int]) -> Track:
+def read_track(path: Path, row_of_mac: Mapping[str, int]) -> MovingTrack:
     """Walk and truth of one ``.mbd`` file.
 
     Parameters
@@ -44,7 +47,7 @@ def read_track(path: Path, row_of_mac: Mapping[str, int]) -> Track:
     Raises
     ------
     DataError
-        If the file cannot be opened or holds no reading.
+        If the file cannot be opened, holds no reading, or its readings lie too far apart.
     """
     lines = _lines(path)
     parsed = [row for line in lines if (row := _row(line, row_of_mac)) is not None]
@@ -54,9 +57,11 @@ def read_track(path: Path, row_of_mac: Mapping[str, int]) -> Track:
         raise DataError(f"{path}: not one reading in it that can be used")
     # Packets of several receivers are written down in the order in which they were processed.
     kept = kept[np.argsort(kept[:, 0], kind="stable")]
+    if kept[-1, 0] - kept[0, 0] > _LONGEST_S:
+        raise DataError(f"{path}: readings more than a day apart; a line has a wrong time")
     time_us = np.rint((kept[:, 0] - kept[0, 0]) * MICROSECONDS_PER_SECOND).astype(np.int64)
     name = path.stem.removesuffix(_SUFFIX)
-    return Track(
+    return MovingTrack(
         walk=_walk(name, time_us, kept),
         truth=WalkTruth(trajectory=_trajectory(time_us, kept[:, 3], kept[:, 4])),
         glitches=len(rows) - len(kept),
@@ -82,7 +87,10 @@ def _row(line: str, row_of_mac: Mapping[str, int]) -> tuple[float, ...] | None:
     except ValueError:
         return None
     unix_s, rssi_dbm, x_m, y_m = numbers
-    if not all(isfinite(number) for number in numbers) or not -127 <= rssi_dbm <= 127:
+    # Written so that NaN is refused as well.
+    if not (0 <= unix_s <= _LAST_UNIX_S and -127 <= rssi_dbm <= 127):
+        return None
+    if not (abs(x_m) <= _MAP_LIMIT_M and abs(y_m) <= _MAP_LIMIT_M):
         return None
     return unix_s, row_of_mac[fields[1]], rssi_dbm, x_m, y_m
 

@@ -84,6 +84,30 @@ def test_a_made_up_set_of_points(tmp_path: Path) -> None:
     assert imported.report[0] == "left out: 1 readings above 0 dBm"
 
 
+def test_numbers_beyond_all_measure_are_no_reading(tmp_path: Path) -> None:
+    good = {"unix_s": 1000, "mac": "aa", "rssi": -60, "x": 1, "y": 1}
+    bad = [{"unix_s": "1e300"}, {"unix_s": -1}, {"x": "1e300"}, {"y": "inf"}, {"rssi": -200}]
+    lines = [LINE.format(**good), *(LINE.format(**good | wrong) for wrong in bad)]
+    imported = read_philotuxo(made_up(tmp_path, "".join(lines)))
+    assert len(imported.recording.walks[0].observations.readings) == 1
+    assert imported.report == ("left out: 5 lines that cannot be read",)
+
+
+def test_nothing_left_out_nothing_told(tmp_path: Path) -> None:
+    line = LINE.format(unix_s=1, mac="aa", rssi=-60, x=1, y=1)
+    assert read_philotuxo(made_up(tmp_path, line)).report == ()
+
+
+def _one_array(folder: Path) -> None:
+    np.save(folder / "a.npy", np.zeros(3))
+    (folder / "a.npy").rename(folder / "fingerprints_set_1.npz")
+
+
+def _years_later(folder: Path) -> None:
+    with (folder / "trk/line_all_sensors.mbd").open("a") as file:
+        file.write(LINE.format(unix_s=1e9, mac="aa", rssi=-60, x=1, y=1))
+
+
 @pytest.mark.parametrize(
     ("spoil", "message"),
     [
@@ -94,6 +118,8 @@ def test_a_made_up_set_of_points(tmp_path: Path) -> None:
         (lambda folder: (folder / "cnf/tetam.par").write_text("{}"), "'limits' of the hall"),
         (lambda folder: (folder / "trk/line_all_sensors.mbd").write_text("x"), "not one reading"),
         (lambda folder: (folder / "fingerprints_set_1.npz").write_text("x"), "damaged"),
+        (_one_array, "one array, where an archive of several is needed"),
+        (_years_later, "more than a day apart"),
     ],
 )
 def test_spoiled_folder(tmp_path: Path, spoil: object, message: str) -> None:

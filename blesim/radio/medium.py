@@ -1,0 +1,219 @@
+"""What all phones of a simulation have in common: senders, obstacles, fields, the crowd."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blesim.radio.advertising import PACKETS_PER_EVENT, clock_name, event_times_us
+from blesim.radio.fading import MultipathField
+from blesim.radio.life import Spell
+from blesim.radio.people import Crowd
+from blesim.radio.propagation import Propagation
+from blesim.radio.shadowing import ShadowField
+from blesim.radio.stock import stock_levels
+from blesim.tables import Trajectory
+from blesim.venue.beacons import CHANNELS, Beacon
+from blesim.venue.floor_plan import Obstacle
+from blesim.venue.line_of_sight import LineOfSight
+from blesim.venue.venue import Venue
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sender:
+    """A beacon on the air while nothing about it changes: its events, and the fields it makes.
+
+    Attributes
+    ----------
+    beacon : Beacon
+        As built.
+    spell : Spell
+        Where and how strong it is, and for how long.
+    clock : str
+        Names the draws of its packets.
+    events_us : ndarray of int64, (n,)
+        Starts of its advertising events in the spell. [us]
+    first_event : int
+        How many events its clock had given before.
+    shadow : ShadowField
+    multipath : tuple of MultipathField
+        One a channel, or none.
+    """
+
+    beacon: Beacon
+    spell: Spell
+    clock: str
+    events_us: NDArray[np.int64]
+    first_event: int
+    shadow: ShadowField
+    multipath: tuple[MultipathField, ...]
+
+
+def senders_of(
+    beacons: Sequence[Beacon],
+    spells: Sequence[Spell],
+    propagation: Propagation,
+    seed: int,
+    until_us: int,
+) -> tuple[Sender, ...]:
+    """Senders of all spells, in their order; spells of one boot share a clock."""
+    senders: list[Sender] = []
+    for (row, boot), group in groupby(spells, lambda spell: (spell.beacon, spell.boot)):
+        beacon, run = beacons[row], list(group)
+        times_us = event_times_us(run[0], beacon.id, propagation.advertising, seed, until_us)
+        for spell in run:
+            first, beyond = np.searchsorted(times_us, [spell.start_us, spell.end_us])
+            place = _place_name(beacon, spell)
+            senders.append(
+                Sender(
+                    beacon=beacon,
+                    spell=spell,
+                    clock=clock_name(beacon.id, boot),
+                    events_us=times_us[first:beyond],
+                    first_event=int(first),
+                    shadow=ShadowField.draw(propagation.shadowing, seed, place),
+                    multipath=_multipath(propagation, seed, place),
+                )
+            )
+    return tuple(senders)
+
+
+def _place_name(beacon: Beacon, spell: Spell) -> str:
+    """What the fields of a beacon are called; where somebody has moved it, they are others."""
+    built = (beacon.x_m, beacon.y_m, beacon.z_m, beacon.level)
+    here = (spell.x_m, spell.y_m, spell.z_m, spell.level)
+    return beacon.id if here == built else f"{beacon.id} at {here}"
+
+
+def _multipath(propagation: Propagation, seed: int, place: str) -> tuple[MultipathField, ...]:
+    fading = propagation.fading
+    channels = CHANNELS if fading.model == "rician" else ()
+    return tuple(MultipathField.draw(fading, seed, place, channel) for channel in channels)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Medium:
+    """The venue as signals see it, for one seed.
+
+    Attributes
+    ----------
+    venue : Venue
+        As built.
+    propagation : Propagation
+        How signals travel there.
+    seed : int
+        Of the simulation.
+    senders : tuple of Sender
+        In the order of beacons and time.
+    crowd : Crowd
+        Everybody who is there.
+    until_us : int
+        End of the simulation. [us]
+    """
+
+    venue: Venue
+    propagation: Propagation
+    seed: int
+    senders: tuple[Sender, ...]
+    crowd: Crowd
+    until_us: int
+
+    @classmethod
+    def over(
+        cls,
+        venue: Venue,
+        propagation: Propagation,
+        seed: int,
+        until_us: int,
+        spells: Sequence[Spell],
+        crowd: Mapping[str, Trajectory],
+    ) -> Self:
+        """The medium of a venue until a time; see `Air.over`."""
+        return cls(
+            venue=venue,
+            propagation=propagation,
+            seed=seed,
+            senders=senders_of(venue.beacons, spells, propagation, seed, until_us),
+            crowd=Crowd.of(crowd),
+            until_us=until_us,
+        )
+
+    @cached_property
+    def lines(self) -> Mapping[int, LineOfSight]:
+        """Obstacles of each level."""
+        levels = (level.level for level in self.venue.floor_plan.levels)
+        return {level: LineOfSight.through(self._obstacles(level)) for level in levels}
+
+    def _obstacles(self, level: int) -> tuple[Obstacle, ...]:
+        return tuple(each for each in self.venue.floor_plan.obstacles if each.level == level)
+
+    @cached_property
+    def packets_per_us(self) -> float:
+        """How many packets all senders together send. [1/us]."""
+        events = sum(len(sender.events_us) for sender in self.senders)
+        return events * PACKETS_PER_EVENT / max(self.until_us, 1)
+
+    @cached_property
+    def beacon(self) -> NDArray[np.int64]:
+        """Row of each sender's beacon, (number of senders,)."""
+        return np.array([sender.spell.beacon for sender in self.senders], np.int64)
+
+    @cached_property
+    def xyz_m(self) -> NDArray[np.float64]:
+        """Place of each sender, its height above its own floor, (number of senders, 3). [m]."""
+        rows = [(s.spell.x_m, s.spell.y_m, s.spell.z_m) for s in self.senders]
+        return np.array(rows, np.float64).reshape(-1, 3)
+
+    @cached_property
+    def level(self) -> NDArray[np.int64]:
+        """Level of each sender, (number of senders,)."""
+        return np.array([sender.spell.level for sender in self.senders], np.int64)
+
+    @cached_property
+    def power_dbm(self) -> NDArray[np.float64]:
+        """Power of each sender at one metre, (number of senders,). [dBm]."""
+        return np.array([s.beacon.measured_power_dbm + s.spell.power_db for s in self.senders])
+
+    @cached_property
+    def headroom_db(self) -> NDArray[np.float64]:
+        """Transmit power less measured power of each sender, (number of senders,). [dB]."""
+        pairs = ((s.beacon.tx_power_dbm, s.beacon.measured_power_dbm) for s in self.senders)
+        return np.array([sent - measured for sent, measured in pairs])
+
+    @cached_property
+    def channel_gain_db(self) -> NDArray[np.float64]:
+        """Of each sender on each channel, (number of senders, 3). [dB]."""
+        return np.array([s.beacon.channel_gain_db for s in self.senders]).reshape(-1, 3)
+
+    @cached_property
+    def antenna(self) -> NDArray[np.float64]:
+        """Direction of the boresight and front-to-back ratio, (number of senders, 3). [-], [dB]."""
+        facing_rad = np.radians([s.beacon.facing_deg or 0.0 for s in self.senders])
+        ratio_db = np.array([s.beacon.front_to_back_db for s in self.senders])
+        return np.stack([np.cos(facing_rad), np.sin(facing_rad), ratio_db], axis=1)
+
+    @cached_property
+    def duration_us(self) -> NDArray[np.int64]:
+        """How long each sender's packets are on air, (number of senders,). [us]."""
+        return np.array([s.beacon.packet_duration_us for s in self.senders], np.int64)
+
+    def spacing_us(self, sender: Sender) -> int:
+        """From the start of one packet of an event to the next. [us]."""
+        return sender.beacon.packet_spacing_us or self.propagation.advertising.packet_spacing_us
+
+    def obstacle_loss_db(
+        self,
+        level: int,
+        time_us: int,
+        sender_m: NDArray[np.float64],
+        phone_m: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """Loss of links through the obstacles of a level, filled as at a time, (n,). [dB]."""
+        stock = self.propagation.stock
+        spell = max(time_us, 0) // stock.hold_us
+        levels = stock_levels(stock, self._obstacles(level), self.seed, spell)
+        return self.lines[level].loss_db(sender_m, phone_m, levels, stock.bay_m)

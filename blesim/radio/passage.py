@@ -1,0 +1,188 @@
+"""A phone on its way through the medium: which packets reach it, when, where and how strong."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blesim.radio.advertising import PACKETS_PER_EVENT
+from blesim.radio.link import (
+    Budget,
+    Geometry,
+    antenna_gain_db,
+    carrier_loss_db,
+    geometry_of,
+    path_loss_db,
+)
+from blesim.radio.medium import Medium, Sender
+from blesim.radio.packets import Scan, Sent, packets_sent, places
+from blesim.radio.people import SWAY_STEP_US, sway_m
+from blesim.radio.phone import Phone
+from blesim.rng import Draws
+from blesim.tables import Trajectory
+from blesim.venue.beacons import CHANNELS
+
+# Packets that are worked on at a time: it bounds the memory, and changes no number.
+BLOCK_PACKETS = 300_000
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Passage:
+    """A phone carried along a trajectory.
+
+    Attributes
+    ----------
+    medium : Medium
+        What it is carried through.
+    phone : Phone
+        Its profile.
+    walker : str
+        Who carries it; names the draws.
+    trajectory : Trajectory
+        Where, on one level.
+    keep : bool
+        Whether packets that nobody listened to are wanted too.
+    """
+
+    medium: Medium
+    phone: Phone
+    walker: str
+    trajectory: Trajectory
+    keep: bool
+
+    @property
+    def level(self) -> int:
+        """Level of the walk."""
+        return int(self.trajectory.level[0])
+
+    @property
+    def span_us(self) -> tuple[int, int]:
+        """Start and end of the walk. [us]."""
+        return int(self.trajectory.time_us[0]), int(self.trajectory.time_us[-1])
+
+    def scan(self) -> Scan:
+        """The phone's scanner; the walk begins anywhere in its cycle."""
+        scanner = self.phone.scanner
+        draws = Draws(seed=self.medium.seed, purpose="scan start", walker=self.walker)
+        cycles = draws.uniforms(np.zeros(1, int))[0, 0]
+        start_us = int(self.span_us[0] - cycles * scanner.cycle_us)
+        return Scan(start_us, scanner.interval_us, scanner.window_us, scanner.all_channels)
+
+    def sway(self) -> NDArray[np.float64]:
+        """How the carrier sways, (n, 2); empty for a phone that nobody holds. [m]."""
+        people = self.medium.propagation.people
+        if not self.phone.held or people.sway_m == 0:
+            return np.empty((0, 2))
+        return sway_m(people, self.medium.seed, self.walker, *self.span_us)
+
+    def blocks(self) -> Iterator[tuple[int, int]]:
+        """Stretches of time with few enough packets, in which shelves stay as they are. [us]."""
+        hold_us = self.medium.propagation.stock.hold_us
+        longest_us = int(BLOCK_PACKETS / max(self.medium.packets_per_us, 1e-6))
+        begin_us, last_us = self.span_us
+        while begin_us < last_us:
+            end_us = min(begin_us + longest_us, (begin_us // hold_us + 1) * hold_us, last_us)
+            yield begin_us, end_us
+            begin_us = end_us
+
+    def sent_by(self, sender: Sender, scan: Scan, begin_us: int, end_us: int) -> Sent:
+        """Packets of a sender that begin between two times and end before the walk does."""
+        duration_us, spacing_us = sender.beacon.packet_duration_us, self.medium.spacing_us(sender)
+        end_us = min(end_us, self.span_us[1] - duration_us)
+        earliest_us = begin_us - PACKETS_PER_EVENT * spacing_us
+        first, beyond = np.searchsorted(sender.events_us, [earliest_us, end_us])
+        return packets_sent(
+            sender.events_us[first:beyond],
+            sender.first_event + int(first),
+            spacing_us,
+            duration_us,
+            (max(begin_us, self.span_us[0]), end_us),
+            scan,
+            keep_all=self.keep,
+        )
+
+    def uniforms(self, sent: list[Sent]) -> NDArray[np.float64]:
+        """Four numbers for each packet, (n, 4): fading, noise, random loss, sensitivity edge."""
+        parts = [
+            Draws(
+                seed=self.medium.seed, purpose="packet", walker=self.walker, beacon=sender.clock
+            ).uniforms(packets.ordinal)
+            for sender, packets in zip(self.medium.senders, sent, strict=True)
+        ]
+        return np.concatenate(parts)
+
+    def geometry(
+        self, time_us: NDArray[np.int64], row: NDArray[np.int64], sway: NDArray[np.float64]
+    ) -> Geometry:
+        """Links of packets that senders of given rows sent at given times."""
+        floors = self.medium.level - self.level
+        beacon_m = self.medium.xyz_m.copy()
+        beacon_m[:, 2] += floors * self.medium.propagation.level_height_m
+        here = places(self.trajectory, time_us, sway, SWAY_STEP_US)
+        links = geometry_of(beacon_m, row, here, self.phone.height_m, np.abs(floors))
+        in_the_way = self.phone.held and not np.any(np.isnan(self.trajectory.heading_rad))
+        return links if in_the_way else links._replace(cos_body=np.full(len(row), np.nan))
+
+    def budget(
+        self,
+        sent: list[Sent],
+        begin_us: int,
+        geometry: Geometry,
+        row: NDArray[np.int64],
+        deviates: NDArray[np.float64],
+    ) -> Budget:
+        """Everything between the antennas, for packets of a block in the order of `sent`."""
+        medium, propagation = self.medium, self.medium.propagation
+        time_us, channel = (np.concatenate([each[column] for each in sent]) for column in (0, 1))
+        obstacles_db = medium.obstacle_loss_db(
+            self.level, begin_us, geometry.beacon_m, geometry.phone_m
+        )
+        headroom_db = medium.headroom_db[row]
+        shadowing_db, fading_db = self._fields(sent, geometry)
+        return Budget(
+            path_loss_db=path_loss_db(propagation, geometry, obstacles_db, channel, headroom_db),
+            obstacle_loss_db=obstacles_db,
+            shadowing_db=shadowing_db,
+            fading_db=fading_db + propagation.fading.of_packets_db(deviates),
+            body_loss_db=carrier_loss_db(propagation, geometry) + self._crowd_db(time_us, geometry),
+            gains_db=self._gains_db(geometry, row, channel),
+        )
+
+    def _gains_db(
+        self, geometry: Geometry, row: NDArray[np.int64], channel: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """Channel gains of beacon and phone, antenna of the beacon, offset of the phone. [dB]."""
+        medium, receiver = self.medium, self.phone.receiver
+        every_db = medium.channel_gain_db + np.array(receiver.channel_gain_db) + receiver.offset_db
+        total_db: NDArray[np.float64] = every_db.ravel()[
+            row * len(CHANNELS) + (channel - CHANNELS[0])
+        ]
+        if medium.antenna[:, 2].any():
+            total_db += antenna_gain_db(medium.antenna[row], geometry)
+        return total_db
+
+    def _crowd_db(self, time_us: NDArray[np.int64], geometry: Geometry) -> NDArray[np.float64]:
+        crossing_db = self.medium.propagation.people.crossing_db
+        crowd = self.medium.crowd
+        if crossing_db == 0 or set(crowd.row_of) <= {self.walker}:
+            return np.zeros(len(time_us))
+        crossings = crowd.crossings(time_us, geometry.phone_m, geometry.beacon_m, self.walker)
+        return crossing_db * crossings.astype(np.float64)
+
+    def _fields(
+        self, sent: list[Sent], geometry: Geometry
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Shadowing and multipath, two arrays (n,). [dB]."""
+        distance_m = geometry.distance_m
+        shadowing_db, fading_db = np.zeros(len(distance_m)), np.zeros(len(distance_m))
+        x_m, y_m = (np.ascontiguousarray(geometry.phone_m[:, axis]) for axis in (0, 1))
+        begin = 0
+        for sender, packets in zip(self.medium.senders, sent, strict=True):
+            whole = slice(begin, begin + len(packets.time_us))
+            sender.shadow.add_to(x_m[whole], y_m[whole], shadowing_db[whole])
+            for number, field in enumerate(sender.multipath):
+                part = slice(begin + packets.first[number], begin + packets.first[number + 1])
+                fading_db[part] = field.at_db(x_m[part], y_m[part], distance_m[part])
+            begin = whole.stop
+        return shadowing_db, fading_db
