@@ -1,5 +1,6 @@
 """The picture of a scored recording: tracks over the floor plan, error distributions beside it."""
 
+import warnings
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
@@ -8,15 +9,19 @@ from typing import Any
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 from shapely import get_coordinates
 
 from blesim.errors import UsageError
+from blesim.report.printable import printable
 from blesim.tables import Track, Trajectory
 from blesim.venue.venue import Venue
+from blesim.whole_file import write_whole
 
 # Told apart by people with any colour vision: Okabe and Ito, "Color universal design", 2008.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -58,9 +63,17 @@ def draw_tracks(
     plan, distribution = figure.subplots(1, 2, width_ratios=(map_width, 4.4))
     _draw_venue(plan, venue)
     _draw_walk(plan, trajectory, tracks, shelves=bool(venue.floor_plan.obstacles))
-    plan.set_title(f"{venue.name}: {walk}", loc="left")
+    plan.set_title(printable(f"{venue.name}: {walk}"), loc="left", parse_math=False)
     _draw_errors(distribution, errors_m)
     return figure
+
+
+def refuse_unknown_format(path: Path) -> None:
+    """Raise `UsageError` if a name ends in no format that can be drawn."""
+    if _kind(path) not in FigureCanvasBase.get_supported_filetypes():
+        raise UsageError(
+            f"{path}: a figure cannot be written as '{_kind(path)}'; use .png, .svg or .pdf"
+        )
 
 
 def save(figure: Figure, path: Path) -> None:
@@ -70,25 +83,25 @@ def save(figure: Figure, path: Path) -> None:
     ------
     UsageError
         If the name ends in no format that can be drawn, or nothing can be written there.
+    DataError
+        If the disk is full or fails.
     """
-    known = figure.canvas.get_supported_filetypes()
-    kind = path.suffix.removeprefix(".")
-    if kind not in known:
-        raise UsageError(f"{path}: a figure cannot be written as '{kind}'; use .png, .svg or .pdf")
-    drawn = BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "blesim"}):
-        figure.savefig(drawn, format=kind, dpi=120, metadata=_no_date(path))
-    part = path.with_name(f".{path.name}.part")
-    try:
-        part.write_bytes(drawn.getvalue())
-        part.replace(path)
-    except OSError as fault:
-        raise UsageError(f"{path}: cannot be written: {fault.strerror}") from fault
+    refuse_unknown_format(path)
+    kind, drawn = _kind(path), BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "blesim"}), warnings.catch_warnings():
+        # A letter that the font lacks is drawn as a box; nobody needs to be told of each.
+        warnings.filterwarnings("ignore", message=r"Glyph .* missing from")
+        figure.savefig(drawn, format=kind, dpi=120, metadata=_no_date(kind))
+    write_whole(path, drawn.getvalue())
 
 
-def _no_date(path: Path) -> dict[str, Any]:
-    dated = {".svg": "Date", ".pdf": "CreationDate"}
-    return {dated[path.suffix]: None} if path.suffix in dated else {}
+def _kind(path: Path) -> str:
+    return path.suffix.removeprefix(".").lower()
+
+
+def _no_date(kind: str) -> dict[str, Any]:
+    dated = {"svg": "Date", "pdf": "CreationDate"}
+    return {dated[kind]: None} if kind in dated else {}
 
 
 def _draw_venue(axes: Axes, venue: Venue) -> None:
@@ -104,13 +117,14 @@ def _draw_venue(axes: Axes, venue: Venue) -> None:
     if len(venue.beacons) <= 40:
         for beacon in venue.beacons:
             axes.annotate(
-                beacon.id,
+                printable(beacon.id),
                 (beacon.x_m, beacon.y_m),
                 xytext=(0, 4),
                 textcoords="offset points",
                 ha="center",
                 fontsize=6.5,
                 color="#444444",
+                parse_math=False,
             )
     axes.set_aspect("equal")
     axes.set_xlabel("x [m]")
@@ -134,9 +148,14 @@ def _draw_walk(
         ends = np.stack([np.stack([poses.x_m, poses.y_m], axis=1), estimates], axis=1)
         axes.add_collection(LineCollection(list(ends), colors=colour, linewidths=0.4, alpha=0.35))
         labels += axes.plot(
-            *estimates.T, ".", markersize=6, color=colour, zorder=5, label=f"estimates: {label}"
+            *estimates.T,
+            ".",
+            markersize=6,
+            color=colour,
+            zorder=5,
+            label=f"estimates: {printable(label)}",
         )
-    axes.legend(
+    legend = axes.legend(
         handles=labels,
         loc="upper center",
         bbox_to_anchor=(0.5, -0.16),
@@ -144,6 +163,7 @@ def _draw_walk(
         frameon=False,
         fontsize=9,
     )
+    _take_literally(legend)
 
 
 def _draw_errors(axes: Axes, errors_m: Mapping[str, NDArray[np.float64]]) -> None:
@@ -151,7 +171,7 @@ def _draw_errors(axes: Axes, errors_m: Mapping[str, NDArray[np.float64]]) -> Non
     for colour, (label, errors) in zip(_cycle(len(errors_m)), errors_m.items(), strict=True):
         ordered = np.sort(errors)
         share = np.arange(1, len(ordered) + 1) / max(len(ordered), 1)
-        axes.step(ordered, share, where="post", color=colour, linewidth=1.8, label=label)
+        axes.step(ordered, share, where="post", color=colour, linewidth=1.8, label=printable(label))
         if len(ordered):
             widest_m = max(widest_m, float(np.quantile(ordered, _ERROR_SHARE)))
     for level, name in ((0.5, "50 %"), (0.9, "90 %")):
@@ -163,7 +183,13 @@ def _draw_errors(axes: Axes, errors_m: Mapping[str, NDArray[np.float64]]) -> Non
     axes.set_ylabel("share of readings with a smaller error [-]")
     axes.set_title("all walks", loc="left")
     axes.spines[["top", "right"]].set_visible(False)
-    axes.legend(loc="lower right", frameon=False, fontsize=9)
+    _take_literally(axes.legend(loc="lower right", frameon=False, fontsize=9))
+
+
+def _take_literally(legend: Legend) -> None:
+    """Let a dollar sign in a name be one, not the beginning of a formula."""
+    for text in legend.get_texts():
+        text.set_parse_math(False)
 
 
 def _cycle(count: int) -> list[str]:

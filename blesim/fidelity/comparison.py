@@ -1,0 +1,68 @@
+"""A recording and its twin, compared: the scorecard, and what the picture of it shows."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from blesim.fidelity.scorecard import Score
+
+Numbers = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Panel:
+    """One plot: the same curve from the recording and from its twin.
+
+    Attributes
+    ----------
+    title, x_label, y_label : str
+        What it shows; labels with their units.
+    kind : str
+        ``distribution``: samples, drawn as share below a value; ``curve``: pairs of x and y.
+    real, simulated : ndarray of float64
+        Samples (n,) of a distribution, or rows x, y of a curve (2, n).
+    """
+
+    title: str
+    x_label: str
+    y_label: str
+    kind: Literal["distribution", "curve"]
+    real: Numbers
+    simulated: Numbers
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Comparison:
+    """What `blesim fidelity` tells of one data set.
+
+    Attributes
+    ----------
+    title : str
+        Which part of which recording is compared, simulated with what.
+    scores : tuple of Score
+        The scorecard.
+    panels : tuple of Panel
+        For the picture.
+    """
+
+    title: str
+    scores: tuple[Score, ...]
+    panels: tuple[Panel, ...]
+
+
+def distribution(
+    title: str, x_label: str, real: Sequence[float] | Numbers, simulated: Sequence[float] | Numbers
+) -> Panel:
+    """A panel of two distributions; what is not finite is left out."""
+    samples = [np.asarray(side, dtype=np.float64) for side in (real, simulated)]
+    return Panel(
+        title=title,
+        x_label=x_label,
+        y_label="share below [-]",
+        kind="distribution",
+        real=samples[0][np.isfinite(samples[0])],
+        simulated=samples[1][np.isfinite(samples[1])],
+    )
