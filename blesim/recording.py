@@ -10,6 +10,7 @@ from typing import Any
 from blesim import columns
 from blesim.errors import DataError
 from blesim.tables import (
+    BeaconHistory,
     Imu,
     Marks,
     Packets,
@@ -21,7 +22,9 @@ from blesim.tables import (
 )
 from blesim.venue.venue import Venue
 
-SCHEMA_VERSION = "1.0"
+SCHEMA_VERSION = "1.1"
+# What tables call the readings of all walks together; no walk may have this name.
+ALL_WALKS = "all"
 
 
 class WalkKind(IntEnum):
@@ -69,6 +72,11 @@ class Walk:
         Part of a benchmark, such as ``"tuning"``; may be empty.
     observations : Observations
         What the phone reported.
+
+    Raises
+    ------
+    DataError
+        If its name is the one that stands for all walks together.
     """
 
     name: str
@@ -78,6 +86,10 @@ class Walk:
     kind: WalkKind = WalkKind.WALK
     split: str = ""
     observations: Observations = field(default_factory=Observations)
+
+    def __post_init__(self) -> None:
+        if self.name == ALL_WALKS:
+            raise DataError(f"walk '{ALL_WALKS}': the name stands for all walks; give it another")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -151,19 +163,20 @@ class Recording:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """What really happened: the venue as built, and each walk by its name."""
+    """What really happened: the venue as built, what befell its beacons, each walk by its name."""
 
     venue: Venue
     walks: MappingProxyType[str, WalkTruth]
+    beacon_events: BeaconHistory = field(default_factory=BeaconHistory.empty)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the walks as what can travel to another process."""
-        return _truth, (self.venue, dict(self.walks))
+        return _truth, (self.venue, dict(self.walks), self.beacon_events)
 
 
-def _truth(venue: Venue, walks: dict[str, WalkTruth]) -> Truth:
+def _truth(venue: Venue, walks: dict[str, WalkTruth], beacon_events: BeaconHistory) -> Truth:
     """Return the truth that a pickle holds."""
-    return Truth(venue=venue, walks=MappingProxyType(walks))
+    return Truth(venue=venue, walks=MappingProxyType(walks), beacon_events=beacon_events)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

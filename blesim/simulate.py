@@ -1,9 +1,8 @@
 """From a scenario and a seed to what phones recorded and what really happened."""
 
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Generator
 from dataclasses import dataclass
-from multiprocessing import get_context
+from functools import cached_property
 from types import MappingProxyType
 from typing import Self
 
@@ -13,6 +12,7 @@ from blesim import __version__
 from blesim.errors import InvariantError, UsageError
 from blesim.imu.step_events import read_steps
 from blesim.radio.air import Air
+from blesim.radio.life import Lives, simulate_life
 from blesim.recording import Observations, Provenance, Recording, Truth, Walk, WalkKind, WalkTruth
 from blesim.rng import refuse_bad_seed
 from blesim.scenario.build import Stage, set_stage
@@ -21,6 +21,7 @@ from blesim.scenario.reading import ScenarioFile
 from blesim.tables import Marks, Steps, StepTruth, Trajectory
 from blesim.walkers.gait import steps_of
 from blesim.walkers.walker import WalkLog, simulate_walkers
+from blesim.workers import workers
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,18 +85,43 @@ class Simulation:
             ),
         )
 
+    @property
+    def until_us(self) -> int:
+        """Just after the last walker has arrived. [us]."""
+        return 1 + max(int(log.knots[-1][0]) for log in self.logs)
+
+    @property
+    def lives(self) -> Lives:
+        """What befell the beacons."""
+        return simulate_life(self.stage.built.beacons, self.scenario.beacon_events, self.until_us)
+
     def air(self) -> Air:
         """What all phones have in common."""
-        until_us = 1 + max(int(log.knots[-1][0]) for log in self.logs)
-        return Air.over(self.stage.built, self.scenario.radio, self.seed, until_us)
+        names = (plan.name for plan in self.scenario.walks)
+        crowd = dict(zip(names, (log.trajectory() for log in self.logs), strict=True))
+        return Air.over(
+            self.stage.built,
+            self.scenario.radio,
+            self.seed,
+            self.until_us,
+            spells=self.lives.spells,
+            crowd=crowd,
+        )
 
-    def walks(self, jobs: int = 1) -> Iterator[tuple[Walk, WalkTruth]]:
+    def walks(self, jobs: int = 1) -> Generator[tuple[Walk, WalkTruth], None, None]:
         """Walks with their truth, in the order of the scenario.
+
+        Who does not take them all closes the generator, which ends its processes.
 
         Parameters
         ----------
         jobs : int
             Processes to share the work; the result is the same for any number.
+
+        Raises
+        ------
+        BlesimError
+            If one of several processes dies.
         """
         if jobs < 1:
             raise UsageError(f"jobs {jobs}: at least one process is needed")
@@ -104,11 +130,8 @@ class Simulation:
             air = self.air()
             yield from (_observed(self, air, row) for row in rows)
             return
-        # A fresh interpreter in each worker: a forked one would inherit threads and open files.
-        with ProcessPoolExecutor(
-            min(jobs, len(rows)), get_context("spawn"), initializer=_adopt, initargs=(self,)
-        ) as pool:
-            yield from pool.map(_observed_by_worker, rows)
+        with workers(min(jobs, len(rows)), _adopt, (self,)) as crew:
+            yield from crew.results(_observed_by_worker, rows)
 
     def recording(self, jobs: int = 1) -> tuple[Recording, Truth]:
         """Recording and truth in memory."""
@@ -119,22 +142,36 @@ class Simulation:
             provenance=self.provenance,
         )
         truth = {walk.name: walk_truth for walk, walk_truth in pairs}
-        return recording, Truth(venue=self.stage.built, walks=MappingProxyType(truth))
+        return recording, Truth(
+            venue=self.stage.built,
+            walks=MappingProxyType(truth),
+            beacon_events=self.lives.log,
+        )
 
 
-_adopted: tuple[Simulation, Air] | None = None
+@dataclass(frozen=True, kw_only=True)
+class _Adopted:
+    """The simulation that a worker process works for; its air is made there once."""
+
+    simulation: Simulation
+
+    @cached_property
+    def air(self) -> Air:
+        return self.simulation.air()
+
+
+_adopted: _Adopted | None = None
 
 
 def _adopt(simulation: Simulation) -> None:
-    """Keep the simulation in a worker process, so that its air is made there once."""
     global _adopted
-    _adopted = simulation, simulation.air()
+    _adopted = _Adopted(simulation=simulation)
 
 
 def _observed_by_worker(row: int) -> tuple[Walk, WalkTruth]:
     if _adopted is None:
         raise InvariantError("a worker was asked for a walk before it knew the simulation")
-    return _observed(*_adopted, row)
+    return _observed(_adopted.simulation, _adopted.air, row)
 
 
 def _observed(simulation: Simulation, air: Air, row: int) -> tuple[Walk, WalkTruth]:

@@ -54,7 +54,9 @@ def test_row_size_is_spelled_from_the_group() -> None:
     assert columns.PACKETS.row_size == "truth_rssi_row_size"
 
 
-@pytest.mark.parametrize("stream", [*columns.OBSERVATIONS, *columns.TRUTH, columns.TRACK])
+@pytest.mark.parametrize(
+    "stream", [*columns.OBSERVATIONS, *columns.TRUTH, *columns.HISTORY, columns.TRACK]
+)
 def test_a_stream_begins_with_its_time(stream: Stream) -> None:
     first = stream.columns[0]
     assert (first.field, first.dtype, stream.ascending) == ("time_us", "int64", True)

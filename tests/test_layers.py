@@ -15,6 +15,9 @@ PACKAGE = Path(blesim.__file__).parent
 # Each room may import from those before it.
 ROOMS = (
     "errors",
+    "stopping",
+    "whole_file",
+    "workers",
     "units",
     "settings",
     "kernels",

@@ -18,7 +18,7 @@ from blesim.recording import (
     WalkKind,
     WalkTruth,
 )
-from blesim.tables import Marks, Readings
+from blesim.tables import BeaconHistory, Marks, Readings
 from blesim.venue.beacons import Beacon
 from blesim.venue.floor_plan import FloorPlan, Level
 from blesim.venue.venue import Venue
@@ -41,6 +41,16 @@ VENUE = Venue(
     beacons=(BEACON,),
 )
 PROVENANCE = Provenance(title="t", source="s")
+DEATH = BeaconHistory(
+    time_us=[7],
+    beacon=[0],
+    event=[0],
+    x_m=[1.0],
+    y_m=[1.0],
+    z_m=[1.0],
+    level=[0],
+    power_change_db=[0.0],
+)
 
 
 def readings(time_us: list[int], beacon: int = 0) -> Readings:
@@ -108,9 +118,15 @@ def test_what_is_refused(walks: tuple[Walk, ...], message: str) -> None:
     [
         recording(walk("a")),
         Truth(venue=VENUE, walks=MappingProxyType({"a": WalkTruth()})),
+        Truth(venue=VENUE, walks=MappingProxyType({}), beacon_events=DEATH),
     ],
-    ids=["recording", "truth"],
+    ids=["recording", "truth", "history"],
 )
 def test_it_travels_to_another_process(value: Any) -> None:
     copy = pickle.loads(pickle.dumps(value))  # noqa: S301
     assert copy == value
+
+
+def test_the_name_of_all_walks_together_is_taken():
+    with pytest.raises(DataError, match="walk 'all': the name stands for all walks"):
+        Walk(name="all", walker="w", phone="p")

@@ -3,7 +3,8 @@ import pickle
 import pytest
 from pydantic import Field, ValidationError
 
-from blesim.settings import Settings
+from blesim import columns
+from blesim.settings import LEVEL_RANGE, MAP_LIMIT_M, Name, Settings, Text, shortened, unreadable
 
 
 class Fan(Settings):
@@ -54,3 +55,35 @@ def test_values_are_frozen_comparable_and_travel() -> None:
         fan.speed_m_s = 3.0  # type: ignore[misc]
     assert pickle.loads(pickle.dumps(fan)) == fan  # noqa: S301
     assert hash(fan) == hash(Fan(speed_m_s=2.0))
+
+
+class Tagged(Settings):
+    name: Name = "n"
+    note: Text = ""
+
+
+@pytest.mark.parametrize("field", ["name", "note"])
+@pytest.mark.parametrize("character", ["\0", "\n", "\x1b", "\x7f", "\x85", "\ud800", "\u2028"])
+def test_texts_that_fit_into_no_line_are_refused(field: str, character: str) -> None:
+    with pytest.raises(ValidationError, match=field):
+        Tagged(**{field: f"a{character}b"})
+    assert unreadable(f"a{character}b")
+
+
+def test_texts_of_any_script_are_taken() -> None:
+    assert Tagged(name="Gänge 1 bis 22, 通路 🛒", note="").name == "Gänge 1 bis 22, 通路 🛒"
+    for name in ("", "a" * 201):
+        with pytest.raises(ValidationError, match="name"):
+            Tagged(name=name)
+
+
+def test_bounds_are_those_a_recording_can_hold() -> None:
+    ranges = {column.field: column.valid_range for column in columns.MARKS.columns}
+    assert ranges["level"] == LEVEL_RANGE
+    assert ranges["x_m"] == (-MAP_LIMIT_M, MAP_LIMIT_M)
+
+
+def test_a_long_text_is_told_by_its_beginning() -> None:
+    assert shortened("short") == "short"
+    assert shortened("x" * 1000) == "x" * 60 + "..."
+    assert shortened("a\nb\ud800ä") == r"a\nb\ud800ä"

@@ -19,6 +19,7 @@ TABLES = (
     tables.Trajectory,
     tables.StepTruth,
     tables.Packets,
+    tables.BeaconHistory,
     tables.Track,
 )
 
@@ -26,6 +27,14 @@ TABLES = (
 def readings(**changes: Any) -> Readings:
     values = {"time_us": [1, 2, 2], "beacon": [0, 1, 0], "rssi_dbm": [-60, -71, -80]}
     return Readings(**{**values, "channel": [0, 37, 39], **changes})
+
+
+def test_a_reading_tells_no_proximity_class_unless_one_is_given() -> None:
+    assert readings().proximity.tolist() == [0, 0, 0]
+    assert readings(proximity=[1, 2, 3]).proximity.tolist() == [1, 2, 3]
+    assert Readings(time_us=[], beacon=[], rssi_dbm=[], channel=[]) == Readings.empty()
+    with pytest.raises(DataError, match="'proximity': 0"):
+        readings(proximity=[])
 
 
 def random_table(kind: type[Table], rows: int, seed: int) -> Table:
@@ -46,7 +55,7 @@ def test_fields_are_the_columns(kind: type[Table]) -> None:
 
 def test_every_stream_of_the_file_has_its_table() -> None:
     streams: set[Stream] = {kind.STREAM for kind in TABLES}
-    assert streams == {*columns.OBSERVATIONS, *columns.TRUTH, columns.TRACK}
+    assert streams == {*columns.OBSERVATIONS, *columns.TRUTH, *columns.HISTORY, columns.TRACK}
     declared = {thing for thing in vars(tables).values() if isinstance(thing, type)}
     assert set(TABLES) == {kind for kind in declared if issubclass(kind, Table)} - {Table}
 

@@ -116,9 +116,13 @@ def _tells_channels(walk: Walk) -> bool:
 
 
 def surveys_of(recording: Recording) -> tuple[Recording, ...]:
-    """Survey walks of a recording, as one recording of the same venue; none if it has none."""
+    """Survey walks of a recording, as one recording of the same venue; none if it has none.
+
+    Without scenario and seed, from which the truth could be simulated once more.
+    """
     surveys = tuple(walk for walk in recording.walks if walk.kind == WalkKind.SURVEY)
-    return (replace(recording, walks=surveys),) if surveys else ()
+    origin = replace(recording.provenance, scenario="", seed=None)
+    return (replace(recording, walks=surveys, provenance=origin),) if surveys else ()
 
 
 def visible(observations: Observations) -> Observations:

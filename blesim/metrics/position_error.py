@@ -182,7 +182,9 @@ def estimated_places(
         If the track names an edge that the graph does not have, or no offset on its edge.
     """
     edge, offset_m = track.edge.astype(np.int64), track.offset_m.astype(np.float64)
-    if np.any(edge >= len(graph.edges)) or np.any(np.isnan(offset_m[edge != NO_EDGE])):
+    if np.any((edge < NO_EDGE) | (edge >= len(graph.edges))) or np.any(
+        np.isnan(offset_m[edge != NO_EDGE])
+    ):
         raise DataError("the track names an edge that the aisle graph lacks, or no offset on it")
     lost = (edge == NO_EDGE) & np.isin(track.level, graph.level)
     edge[lost], offset_m[lost], _ = graph.nearest(

@@ -9,10 +9,8 @@ from blesim.columns import NO_EDGE
 from blesim.errors import DataError
 from blesim.metrics.position_error import PositionErrors, no_errors, pooled, position_errors
 from blesim.metrics.summary import ErrorSummary, summarise
-from blesim.recording import Failure, Recording, Truth, Walk, WalkKind
+from blesim.recording import ALL_WALKS, Failure, Recording, Truth, Walk, WalkKind
 from blesim.tables import Track
-
-ALL_WALKS = "all"
 
 # Tracks by the label of the estimator and the name of the walk.
 Tracks = Mapping[tuple[str, str], Track | Failure]

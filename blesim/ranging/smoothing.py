@@ -23,6 +23,8 @@ from blesim.tables import Readings
 from blesim.units import to_us
 
 SignalKind = Literal["highest", "averaged"]
+# No walk lasts longer: the valid range of times in a recording.
+LONGEST_WINDOW_S = 366 * 24 * 3600
 
 
 class SignalWindow:
@@ -37,7 +39,7 @@ class SignalWindow:
     signal : {"highest", "averaged"}
         Which signal value is formed.
     window_s : float
-        Length of the window, at least a microsecond. [s]
+        Length of the window, from a microsecond to `LONGEST_WINDOW_S`. [s]
     rate : float
         Weight of a new reading in the average, over 0 to 1; not used by ``highest``. [-]
 
@@ -134,8 +136,8 @@ def refuse_bad_window(signal: str, window_s: float, rate: float) -> None:
     """Raise `UsageError` if the parameters of a window are out of their ranges."""
     if signal not in get_args(SignalKind):
         raise UsageError(f"signal '{signal}': use one of {', '.join(get_args(SignalKind))}")
-    if not 1e-6 <= window_s < float("inf"):
-        raise UsageError(f"window_s {window_s:g}: give a positive number of seconds")
+    if not 1e-6 <= window_s <= LONGEST_WINDOW_S:
+        raise UsageError(f"window_s {window_s:g}: give 1e-6 to {LONGEST_WINDOW_S} seconds")
     if not 0 < rate <= 1:
         raise UsageError(f"rate {rate:g}: give a number above 0, up to 1")
 

@@ -69,11 +69,21 @@ def test_score_draws(section):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_a_figure_in_a_format_nobody_knows_is_refused(section):
-    picture = section / "score.docx"
-    ended = blesim("score", section / "a.h5", section / "t.h5", "--plot", picture, expect=2)
-    assert "score.docx" in ended.stderr
-    assert not picture.exists()
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["new/score.docx"], "score.docx"),
+        (["new/a.png", "--plot-walk", "x"], "no walk 'x' to draw"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused_before_anything_is_made(section, options, words):
+    plot, *rest = options
+    ended = blesim(
+        "score", section / "a.h5", section / "t.h5", "--plot", section / plot, *rest, expect=2
+    )
+    assert words in ended.stderr
+    assert ended.stdout == ""
+    assert not (section / "new").exists()
 
 
 def test_inspect_tells_what_is_inside(section):
@@ -146,6 +156,8 @@ def test_a_real_recording_goes_through_the_same_door(data_dir, tmp_path):
         (["estimate", "a.h5", "-e", "nearest-beacon", "-e", "nearest-beacon"], 2, "twice"),
         (["score", "other.h5", "t.h5"], 1, "made from another recording"),
         (["score", "a.h5", "a.h5"], 1, "a.h5"),
+        (["score", "short.h5", "t.h5"], 1, "short.h5: damaged (truncated file); make it again"),
+        (["estimate", "a.h5", "-e", "nearest-beacon:window_s=1e300"], 2, "31622400 seconds"),
         (["validate", "short.h5"], 1, "short.h5"),
         (["inspect", "foreign.h5"], 1, "foreign.h5"),
         (["import", "fax", "."], 2, "unknown format 'fax'; known are philotuxo"),
@@ -195,20 +207,25 @@ def test_a_closed_pipe_ends_quietly():
     assert ended.stderr == ""
 
 
-def test_an_interrupt_leaves_nothing(tmp_path):
-    slow = SECTION.read_text(encoding="utf-8").replace("speed_m_s: 1.0", "speed_m_s: 0.002")
-    slow = slow.replace("map: wholesale-section.geojson", "layout: wholesale-section")
+@pytest.mark.parametrize("jobs", ["1", "2"])
+def test_an_interrupt_leaves_nothing(tmp_path, jobs):
+    walk = "{{name: w{}, phone: p, speed_m_s: 0.05, route: [D1, D8, E9, E1, D1, E9, D1]}}"
+    walks = "".join(f"  - {walk.format(number)}\n" for number in range(60))
+    slow = f"title: t\nvenue: {{layout: wholesale-section}}\nphones: {{p: {{}}}}\nwalks:\n{walks}"
     (tmp_path / "slow.yaml").write_text(slow, encoding="utf-8")
     process = subprocess.Popen(
-        [*COMMAND, "simulate", "slow.yaml", "--seed", "1", "-o", "a.h5"],
+        [*COMMAND, "simulate", "slow.yaml", "--seed", "1", "-o", "a.h5", "--jobs", jobs],
         cwd=tmp_path,
         stderr=subprocess.PIPE,
         text=True,
-        env=os.environ | {"PYTHONUNBUFFERED": "1"},
+        # A group of its own, so that a signal reaches the workers as Ctrl-C does.
+        start_new_session=True,
     )
-    time.sleep(3.0)
-    process.send_signal(signal.SIGINT)
+    process.stderr.readline()
+    os.killpg(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert errors.strip().splitlines()[-1] == "blesim: stopped; no output was changed"
+    last = "blesim: stopped; every output is either whole or as it was before"
+    assert errors.strip().splitlines()[-1] == last
+    assert "Traceback" not in errors
     assert [path.name for path in tmp_path.iterdir()] == ["slow.yaml"]

@@ -105,7 +105,7 @@ def test_values_are_read_by_the_type_of_their_parameter():
         ("nearest-beacon:signal=loud", "signal=loud: .*'highest' or 'averaged'"),
         ("nearest-beacon:window_s=long", "window_s=long: .*valid number"),
         ("nearest-beacon:window_s=nan", "window_s=nan: .*finite"),
-        ("nearest-beacon:window_s=-1", "window_s -1: give a positive number"),
+        ("nearest-beacon:window_s=-1", "window_s -1: give 1e-6 to"),
         ("nearest-beacon:window_s", "'window_s' is not of the form key=value"),
         ("nearest-beacon:rate=1,rate=1", "'rate' is given twice"),
     ],

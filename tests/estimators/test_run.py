@@ -9,7 +9,7 @@ from blesim.errors import DataError, UsageError
 from blesim.estimators.base import Need, StartInfo, make_track
 from blesim.estimators.nearest_beacon import NearestBeacon
 from blesim.estimators.practice import practice_recording
-from blesim.estimators.run import run, start_of
+from blesim.estimators.run import run, start_of, surveys_of
 from blesim.recording import Failure, Observations, WalkKind
 from blesim.tables import Imu, Marks, Readings, Steps
 
@@ -66,6 +66,13 @@ def test_fit_is_given_the_survey_walks_and_nothing_else():
     assert venue is RECORDING.venue
     assert [[walk.name for walk in survey.walks] for survey in surveys] == [["survey"]]
     assert len(surveys[0].walks[0].observations.marks)
+
+
+def test_surveys_tell_neither_scenario_nor_seed():
+    origin = replace(RECORDING.provenance, scenario="walks: [...]", seed=7)
+    (survey,) = surveys_of(replace(RECORDING, provenance=origin))
+    assert (survey.provenance.scenario, survey.provenance.seed) == ("", None)
+    assert survey.provenance.title == origin.title
 
 
 def test_a_tracker_sees_all_but_the_marks():

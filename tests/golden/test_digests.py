@@ -23,10 +23,10 @@ walks:
 """
 
 COUNTS = {
-    "one": {"rssi": 158, "imu": 0, "steps": 19, "marks": 6},
-    "two": {"rssi": 83, "imu": 0, "steps": 14, "marks": 4},
+    "one": {"rssi": 93, "imu": 0, "steps": 19, "marks": 6},
+    "two": {"rssi": 50, "imu": 0, "steps": 14, "marks": 4},
 }
-DIGEST = "103e4cefa4e686cb3bd5020c21e814e6aedab6b23760c02b1c7a476261509b1f"
+DIGEST = "7f90e5217f78cb7b6c6931f2a2832c9f47486f9bf7a85676236fa895a8d39b92"
 
 
 @pytest.fixture(scope="module")

@@ -119,3 +119,9 @@ def test_figures_do_not_depend_on_the_order_of_walks(by_hand, world):
     back = score(replace(recording, walks=recording.walks[::-1]), truth, tracks)[-1].summary
     np.testing.assert_allclose(there.mean_m, back.mean_m)
     assert there.ce95_m == back.ce95_m
+
+
+def test_an_edge_before_the_first_is_refused(by_hand, world):
+    track = by_hand.track_of([0], 8.0, 2.0, edge=-7, offset_m=1.0)
+    with pytest.raises(DataError, match="names an edge that the aisle graph lacks"):
+        score(*world, {("a", "short"): track})

@@ -1,0 +1,104 @@
+import os
+import subprocess
+import sys
+import time
+
+import pytest
+
+from blesim.errors import BlesimError, DataError
+from blesim.workers import workers
+
+PARENT = """
+import sys, time
+sys.path.insert(0, {folder!r})
+import test_workers
+from blesim.workers import workers
+if __name__ == "__main__":
+    with workers(1, test_workers.prepare, ()) as crew:
+        for pid in crew.results(test_workers.tell_and_sleep, [0, 0, 0, 60]):
+            print(pid, flush=True)
+"""
+
+
+def double(number):
+    return 2 * number
+
+
+def refuse(number):
+    raise DataError(f"piece {number}")
+
+
+def die(_number):
+    os._exit(9)
+
+
+def tell_and_sleep(seconds):
+    time.sleep(seconds)
+    return os.getpid()
+
+
+def divide_or_sleep(seconds):
+    return 1 // seconds if not seconds else time.sleep(seconds)
+
+
+def prepare():
+    pass
+
+
+def test_results_come_in_order_and_pieces_are_not_taken_too_early():
+    taken = []
+
+    def pieces():
+        for number in range(12):
+            taken.append(number)
+            yield number
+
+    with workers(2, prepare, ()) as crew:
+        found = []
+        for result in crew.results(double, pieces()):
+            found.append(result)
+            assert len(taken) - len(found) <= 4
+    assert found == [2 * number for number in range(12)]
+
+
+def test_a_fault_in_a_worker_is_told_as_it_is():
+    with pytest.raises(DataError, match="piece 3"), workers(1, prepare, ()) as crew:
+        list(crew.results(refuse, [3]))
+
+
+def test_a_dead_worker_is_one_line():
+    with pytest.raises(BlesimError, match="a worker process died"), workers(1, prepare, ()) as crew:
+        list(crew.results(die, [1, 2, 3]))
+
+
+def test_who_stops_early_waits_for_nobody():
+    start_s = time.monotonic()
+    with pytest.raises(ZeroDivisionError), workers(1, prepare, ()) as crew:
+        next(crew.results(divide_or_sleep, [0, 0, 60]))
+    assert time.monotonic() - start_s < 30
+
+
+def alive(pid):
+    """Whether a process runs; one that waits to be counted does not."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="utf-8") as file:
+            return file.read().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(not os.path.exists("/proc/self/stat"), reason="no /proc to look into")
+def test_workers_die_with_their_parent(tmp_path):
+    script = tmp_path / "parent.py"
+    script.write_text(PARENT.format(folder=os.path.dirname(__file__)), encoding="utf-8")
+    parent = subprocess.Popen(
+        [sys.executable, script], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    worker = int(parent.stdout.readline())
+    assert alive(worker)
+    parent.kill()
+    parent.communicate()
+    until_s = time.monotonic() + 10
+    while alive(worker) and time.monotonic() < until_s:
+        time.sleep(0.05)
+    assert not alive(worker)
