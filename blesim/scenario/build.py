@@ -10,6 +10,7 @@ from shapely.ops import nearest_points
 
 from blesim.errors import BlesimError, ScenarioError, VenueError
 from blesim.radio.beacon_events import Moves, impossible_events, in_order
+from blesim.recording import ALL_WALKS
 from blesim.rng import Draws
 from blesim.scenario.model import RouteStop, VenueSource, WalkPlan
 from blesim.scenario.reading import ScenarioFile
@@ -126,6 +127,9 @@ def _name_faults(file: ScenarioFile) -> list[str]:
     for row, plan in enumerate(file.scenario.walks):
         if plan.name in seen:
             message = f"walk '{plan.name}' is there twice; give each its own name"
+            faults.append(file.fault(["walks", row, "name"], message))
+        if plan.name == ALL_WALKS:
+            message = f"'{ALL_WALKS}' stands for all walks in error tables; give another name"
             faults.append(file.fault(["walks", row, "name"], message))
         seen.add(plan.name)
     return faults

@@ -73,6 +73,7 @@ def test_changed_parameters_are_checked_and_told_in_the_text(scenario):
     ("old", "new", "expected"),
     [
         ("seed: 1", "sed: 1", "scenario.yaml:2: sed: unknown key"),
+        ("name: run", "name: all", "scenario.yaml:7: walks.0.name: 'all' stands for all walks"),
         ("seed: 1", "seed: -1", "scenario.yaml:2: seed: "),
         ("seed: 1", "seed: '1'", "scenario.yaml:2: seed: "),
         ("speed_m_s: 1.2", "speed_m_s: fast", "scenario.yaml:9: walks.0.speed_m_s: "),
