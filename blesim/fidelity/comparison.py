@@ -7,9 +7,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from blesim.errors import UsageError
 from blesim.fidelity.scorecard import Score
 
 Numbers = NDArray[np.float64]
+# A twin that hears a smaller share of the readings has nothing to compare.
+_HEARD = 0.05
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -51,6 +54,21 @@ class Comparison:
     title: str
     scores: tuple[Score, ...]
     panels: tuple[Panel, ...]
+
+
+def refuse_silent(real: int, simulated: int) -> None:
+    """Raise `UsageError` if the twin hears next to nothing of what was recorded.
+
+    Parameters
+    ----------
+    real, simulated : int
+        Numbers of readings.
+    """
+    if simulated < _HEARD * real:
+        raise UsageError(
+            f"the twin has {simulated} readings where {real} were recorded: too few to compare;"
+            " look at the powers and losses of the radio"
+        )
 
 
 def distribution(

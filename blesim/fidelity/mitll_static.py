@@ -19,7 +19,7 @@ import shapely
 from numpy.typing import NDArray
 
 from blesim.errors import DataError
-from blesim.fidelity.comparison import Comparison
+from blesim.fidelity.comparison import Comparison, refuse_silent
 from blesim.fidelity.links import standing_at
 from blesim.fidelity.room_statistics import Cell, room_panels, room_statistics
 from blesim.fidelity.scorecard import scorecard
@@ -209,12 +209,16 @@ def compare_rooms(path: Path, radio: Propagation | None, seed: int) -> Compariso
     ------
     DataError
         If the data set cannot be read.
+    UsageError
+        If the twin hears next to nothing.
     """
     real = {room: read_room(path, room, SCORED_PLACEMENTS) for room in ROOMS}
     simulated = {
         room: room_twin(cells, radio or ENVIRONMENTS[ROOMS[room][1]], seed)
         for room, cells in real.items()
     }
+    for room in ROOMS:
+        refuse_silent(*(sum(len(c.rssi_dbm) for c in side[room]) for side in (real, simulated)))
     scores = [
         scorecard(room_statistics(room, real[room]), room_statistics(room, simulated[room]))
         for room in ROOMS

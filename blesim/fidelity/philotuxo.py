@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.dataset.exchange.philotuxo import read_philotuxo
-from blesim.fidelity.comparison import Comparison
+from blesim.fidelity.comparison import Comparison, refuse_silent
 from blesim.fidelity.hall_statistics import (
     POINT_HEIGHT_M,
     TRACK_HEIGHT_M,
@@ -135,11 +135,16 @@ def compare_hall(path: Path, radio: Propagation | None, seed: int) -> Comparison
     ------
     DataError
         If the data set cannot be read.
+    UsageError
+        If the twin hears next to nothing.
     """
     real = read_hall(path, "set 2")
     radio = ENVIRONMENTS["hall"] if radio is None else radio
     power_dbm = receiver_power_dbm(read_hall(path, "set 1"), radio.path_loss_exponent)
     simulated = hall_twin(real, power_dbm, radio, seed)
+    refuse_silent(
+        *(sum(len(link.rssi_dbm) for link in hall.point_links()) for hall in (real, simulated))
+    )
     return Comparison(
         title="philotuxo: hall, set 2 and tracks",
         scores=scorecard(hall_statistics(real), hall_statistics(simulated)),

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.dataset.exchange.uji_library import read_uji_library
-from blesim.fidelity.comparison import Comparison
+from blesim.fidelity.comparison import Comparison, refuse_silent
 from blesim.fidelity.library_fit import LEVEL_DBM, LIBRARY
 from blesim.fidelity.library_statistics import Library, library_panels, library_statistics
 from blesim.fidelity.scorecard import scorecard
@@ -132,10 +132,18 @@ def compare_library(path: Path, radio: Propagation | None, seed: int) -> Compari
     ------
     DataError
         If the data set cannot be read.
+    UsageError
+        If the twin hears next to nothing.
     """
     real = read_library(path, SCORED)
     radio = ENVIRONMENTS["library"] if radio is None else radio
     simulated = library_twin(real, LIBRARY.profiles(), LEVEL_DBM, radio, seed)
+    refuse_silent(
+        *(
+            sum(int(np.isfinite(point.rssi_dbm).sum()) for point in side.points())
+            for side in (real, simulated)
+        )
+    )
     return Comparison(
         title="uji_library: campaign 3",
         scores=scorecard(library_statistics(real), library_statistics(simulated)),

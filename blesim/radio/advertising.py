@@ -32,7 +32,8 @@ class Advertising(Settings):
 
 def clock_name(beacon: str, boot: int) -> str:
     """What the clock of a beacon is called in the address of its draws; each boot is another."""
-    return beacon if boot == 0 else f"{beacon}#{boot}"
+    # No name holds a control character, so none can be another beacon's later boot.
+    return beacon if boot == 0 else f"{beacon}\x1f{boot}"
 
 
 def event_times_us(

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from blesim.settings import Settings
+from blesim.settings import MAP_LIMIT_M, LevelNumber, MapCoordinate, Name, Settings
 from blesim.venue.beacons import AdvertisingInterval, Beacon, MeasuredPower
 
 _LONGEST_S = 366 * 86400.0
@@ -23,7 +23,7 @@ class _Happening(Settings):
     """
 
     at_s: float = Field(ge=0, le=_LONGEST_S)
-    beacon: str
+    beacon: Name
 
 
 class Dies(_Happening):
@@ -53,10 +53,10 @@ class Moves(_Happening):
     """
 
     event: Literal["moves"] = "moves"
-    x_m: float
-    y_m: float
-    z_m: float | None = Field(default=None, ge=0)
-    level: int | None = None
+    x_m: MapCoordinate
+    y_m: MapCoordinate
+    z_m: float | None = Field(default=None, ge=0, le=MAP_LIMIT_M)
+    level: LevelNumber | None = None
 
 
 class Replaced(_Happening):

@@ -17,7 +17,8 @@ class Collisions(Settings):
     ----------
     model : str
         ``capture``: a packet survives if every other one that overlaps it on its channel is weaker
-        by the threshold; ``none``.
+        by the threshold; ``none``. A packet that is cut off by the edge of a scan window takes no
+        part.
     capture_db : float
         The threshold; receivers' data sheets give a co-channel rejection of 13 to 14, and 10 leaves
         room for its spread. [dB]

@@ -86,13 +86,22 @@ def _place_name(beacon: Beacon, spell: Spell) -> str:
     """What the fields of a beacon are called; where somebody has moved it, they are others."""
     built = (beacon.x_m, beacon.y_m, beacon.z_m, beacon.level)
     here = (spell.x_m, spell.y_m, spell.z_m, spell.level)
-    return beacon.id if here == built else f"{beacon.id} at {here}"
+    return beacon.id if here == built else f"{beacon.id}\x1f{here}"
 
 
 def _multipath(propagation: Propagation, seed: int, place: str) -> tuple[MultipathField, ...]:
     fading = propagation.fading
     channels = CHANNELS if fading.model == "rician" else ()
     return tuple(MultipathField.draw(fading, seed, place, channel) for channel in channels)
+
+
+def _crowds(walkers: Mapping[str, Trajectory]) -> Mapping[int, Crowd]:
+    """Who is on each level; a walker stays on one."""
+    level = {name: int(trajectory.level[0]) for name, trajectory in walkers.items()}
+    return {
+        each: Crowd.of({name: walkers[name] for name in walkers if level[name] == each})
+        for each in sorted(set(level.values()))
+    }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,8 +118,8 @@ class Medium:
         Of the simulation.
     senders : tuple of Sender
         In the order of beacons and time.
-    crowd : Crowd
-        Everybody who is there.
+    crowds : mapping of int to Crowd
+        Everybody who is there, level by level.
     until_us : int
         End of the simulation. [us]
     """
@@ -119,7 +128,7 @@ class Medium:
     propagation: Propagation
     seed: int
     senders: tuple[Sender, ...]
-    crowd: Crowd
+    crowds: Mapping[int, Crowd]
     until_us: int
 
     @classmethod
@@ -138,7 +147,7 @@ class Medium:
             propagation=propagation,
             seed=seed,
             senders=senders_of(venue.beacons, spells, propagation, seed, until_us),
-            crowd=Crowd.of(crowd),
+            crowds=_crowds(crowd),
             until_us=until_us,
         )
 

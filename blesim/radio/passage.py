@@ -164,8 +164,8 @@ class Passage:
 
     def _crowd_db(self, time_us: NDArray[np.int64], geometry: Geometry) -> NDArray[np.float64]:
         crossing_db = self.medium.propagation.people.crossing_db
-        crowd = self.medium.crowd
-        if crossing_db == 0 or set(crowd.row_of) <= {self.walker}:
+        crowd = self.medium.crowds.get(self.level)
+        if crossing_db == 0 or crowd is None or set(crowd.row_of) <= {self.walker}:
             return np.zeros(len(time_us))
         crossings = crowd.crossings(time_us, geometry.phone_m, geometry.beacon_m, self.walker)
         return crossing_db * crossings.astype(np.float64)

@@ -106,7 +106,8 @@ class Receiver(Settings):
     Attributes
     ----------
     offset_db : float
-        What this phone reads above the standard; two of one maker differ by up to 11. [dB]
+        What this phone's scale reads above the standard; two of one maker differ by up to 11. The
+        sensitivity counts on the same scale, as do the levels at which reception was measured. [dB]
     channel_gain_db : tuple of three float
         Departure on channels 37, 38, 39. [dB]
     noise_db : float

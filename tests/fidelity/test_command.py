@@ -58,3 +58,18 @@ def test_a_bad_call_is_one_line(arguments, code, told):
     ended = fidelity(*arguments, expect=code)
     assert told in ended.stderr
     assert ended.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("dataset", ["philotuxo", "mitll_static", "uji_library"])
+def test_a_twin_that_hears_nothing_is_told_in_one_line(dataset, data_dir, tmp_path):
+    scenario = tmp_path / "deaf.yaml"
+    scenario.write_text(
+        "title: deaf\n"
+        "venue: {layout: wholesale-section}\n"
+        "radio: {traffic_loss: 1.0}\n"
+        "phones: {a: {}}\n"
+        "walks: [{name: w, phone: a, route: [E1, E2]}]\n"
+    )
+    ended = fidelity(dataset, data_dir(dataset), "--scenario", scenario, expect=2)
+    assert "too few to compare" in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1

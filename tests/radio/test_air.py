@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -285,6 +287,17 @@ def test_people_on_the_link_weaken_it(section):
     # The other stands to the east of all links that are blocked.
     assert all(section.beacons[row].x_m > 11.9 for row in np.unique(blocked.beacon))
     assert {section.beacons[row].id for row in np.unique(blocked.beacon)} >= {"D7", "D8"}
+
+
+def test_people_on_another_level_are_not_on_the_link(section):
+    trajectory = walk_along(section, "D3", "D1", walker="w")
+    standing = walk_along(section, "D3", "D4", pause_s=200.0, walker="other")
+    upstairs = replace(standing, level=np.ones(len(standing), int))
+    people = People(body_loss_db=0, sway_m=0, crossing_db=5)
+    propagation = QUIET.model_copy(update={"people": people})
+    crowd = {"w": trajectory, "other": upstairs}
+    air = Air.over(section, propagation, SEED, int(trajectory.time_us[-1]) + 1, crowd=crowd)
+    assert not air.heard_by(PERFECT, "w", trajectory, keep_packets=True).packets.body_loss_db.any()
 
 
 def test_floors_cost_what_the_recommendation_says(section):

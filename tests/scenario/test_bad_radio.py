@@ -2,6 +2,7 @@
 
 import pytest
 
+from blesim.errors import ScenarioError
 from blesim.radio.beacon_events import Moves, Replaced
 from blesim.scenario.build import set_stage
 from blesim.scenario.reading import read_scenario
@@ -136,3 +137,21 @@ def test_possible_events_are_read(written):
     assert replaced == Replaced(at_s=9, beacon="D1", measured_power_dbm=-71.0)
     assert isinstance(moved, Moves)
     assert file.with_parameters(seed=2).scenario.beacon_events == file.scenario.beacon_events
+
+
+@pytest.mark.parametrize(
+    "move", ["z_m: 1.0e+300", "z_m: 1.0e+6", "level: 999", "z_m: -1"], ids=lambda move: move[:9]
+)
+def test_a_beacon_moved_out_of_this_world_is_refused(move, tmp_path):
+    path = tmp_path / "scenario.yaml"
+    path.write_text(
+        "title: far\n"
+        "venue: {layout: wholesale-section}\n"
+        "phones: {a: {}}\n"
+        "beacon_events:\n"
+        f"  - {{at_s: 1, beacon: E1, event: moves, x_m: 5.0, y_m: 15.4, {move}}}\n"
+        "walks: [{name: w, phone: a, route: [E1, E2]}]\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(ScenarioError, match=r"scenario\.yaml:5: beacon_events\.0\."):
+        set_stage(read_scenario(path), 1)
