@@ -96,7 +96,8 @@ def _fill_geometry(
         flat = away_x * away_x + away_y * away_y
         distance[k] = np.sqrt(flat + (beacon[k, 2] - height) ** 2)
         towards = away_x * cos_heading[k] + away_y * sin_heading[k]
-        cos_body[k] = towards / max(np.sqrt(flat), 1e-9)
+        # In three dimensions: straight below a beacon no way of standing is towards it.
+        cos_body[k] = towards / max(distance[k], 1e-9)
 
 
 class Budget(NamedTuple):

@@ -166,10 +166,9 @@ class Scanner:
         if propagation.fading.model == "gaussian":
             level += propagation.fading.standard_deviation_db * deviate
         if self.phone.held:
-            away = math.hypot(beacon.x_m - x, beacon.y_m - y)
             cosine = (
                 (beacon.x_m - x) * math.cos(heading) + (beacon.y_m - y) * math.sin(heading)
-            ) / away
+            ) / distance
             level -= propagation.people.body_loss_db * (1 - cosine) / 2
         return level
 

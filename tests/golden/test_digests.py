@@ -26,7 +26,7 @@ COUNTS = {
     "one": {"rssi": 93, "imu": 0, "steps": 19, "marks": 6},
     "two": {"rssi": 50, "imu": 0, "steps": 14, "marks": 4},
 }
-DIGEST = "7f90e5217f78cb7b6c6931f2a2832c9f47486f9bf7a85676236fa895a8d39b92"
+DIGEST = "5ea805bb1230fb3b91d204538ce14ae4b0216a90fa4eefbeadbb9849edfd2924"
 
 
 @pytest.fixture(scope="module")

@@ -272,6 +272,16 @@ def test_body_swings_the_level_by_its_front_to_back_loss(section):
     assert not nobody.packets.body_loss_db.any()
 
 
+def test_straight_below_a_beacon_swaying_does_not_swing_the_body(section):
+    above = section.beacons[0].model_copy(update={"x_m": 20.0, "y_m": 8.1, "z_m": 3.0})
+    venue = section.with_beacons((above,))
+    propagation = QUIET.model_copy(update={"people": People(body_loss_db=12.0, sway_m=0.03)})
+    trajectory = walk_along(venue, "E4", "E5", pause_s=60.0)
+    packets = heard(venue, trajectory, propagation).packets
+    still = packets.rows(packets.time_us < 59_000_000)
+    assert still.body_loss_db == pytest.approx(6.0, abs=0.7)
+
+
 def test_people_on_the_link_weaken_it(section):
     # One stands at D3 while another walks away from there along the aisle.
     standing = walk_along(section, "D3", "D4", pause_s=200.0, walker="other")
