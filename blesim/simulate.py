@@ -38,6 +38,10 @@ class Simulation:
         Venue and itineraries.
     logs : tuple of WalkLog
         One a walk.
+    until_us : int
+        Just after the last walker has arrived. [us]
+    lives : Lives
+        What befell the beacons until then.
     provenance : Provenance
         For the recording.
     """
@@ -46,6 +50,8 @@ class Simulation:
     seed: int
     stage: Stage
     logs: tuple[WalkLog, ...]
+    until_us: int
+    lives: Lives
     provenance: Provenance
 
     @classmethod
@@ -71,11 +77,15 @@ class Simulation:
             raise UsageError(f"{file.path}: no seed; give --seed N, or 'seed: N' in the scenario")
         refuse_bad_seed(seed)
         stage = set_stage(file, seed)
+        logs = simulate_walkers(stage.graph, stage.itineraries)
+        until_us = 1 + max(int(log.knots[-1][0]) for log in logs)
         return cls(
             scenario=file.scenario,
             seed=seed,
             stage=stage,
-            logs=simulate_walkers(stage.graph, stage.itineraries),
+            logs=logs,
+            until_us=until_us,
+            lives=simulate_life(stage.built.beacons, file.scenario.beacon_events, until_us),
             provenance=Provenance(
                 title=file.scenario.title,
                 source=f"blesim {__version__}",
@@ -84,16 +94,6 @@ class Simulation:
                 seed=seed,
             ),
         )
-
-    @property
-    def until_us(self) -> int:
-        """Just after the last walker has arrived. [us]."""
-        return 1 + max(int(log.knots[-1][0]) for log in self.logs)
-
-    @property
-    def lives(self) -> Lives:
-        """What befell the beacons."""
-        return simulate_life(self.stage.built.beacons, self.scenario.beacon_events, self.until_us)
 
     def air(self) -> Air:
         """What all phones have in common."""

@@ -1,16 +1,18 @@
 """A recording and its twin, compared: the scorecard, and what the picture of it shows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
+from blesim.fidelity.links import median_over
 from blesim.fidelity.scorecard import Score
 
 Numbers = NDArray[np.float64]
+UnitT = TypeVar("UnitT")
 # A twin that hears a smaller share of the readings has nothing to compare.
 _HEARD = 0.05
 
@@ -69,6 +71,41 @@ def refuse_silent(real: int, simulated: int) -> None:
             f"the twin has {simulated} readings where {real} were recorded: too few to compare;"
             " look at the powers and losses of the radio"
         )
+
+
+def correlation_panel(
+    title: str,
+    unit: str,
+    lags_s: Numbers,
+    correlations: Callable[[Sequence[UnitT], float], Sequence[float]],
+    real: Sequence[UnitT],
+    simulated: Sequence[UnitT],
+) -> Panel:
+    """A panel of the median autocorrelation over the units of each side, lag by lag.
+
+    Parameters
+    ----------
+    title, unit : str
+        What it shows; what a unit is.
+    lags_s : ndarray of float64, (n,)
+        [s]
+    correlations : callable
+        Autocorrelations of all units of a side at a lag [s].
+    real, simulated : sequence
+        Units of both sides.
+    """
+    curves = [
+        [median_over(correlations(side, lag)) for lag in lags_s.tolist()]
+        for side in (real, simulated)
+    ]
+    return Panel(
+        title=title,
+        x_label="lag [s]",
+        y_label=f"autocorrelation, median {unit} [-]",
+        kind="curve",
+        real=np.array([lags_s, curves[0]]),
+        simulated=np.array([lags_s, curves[1]]),
+    )
 
 
 def distribution(

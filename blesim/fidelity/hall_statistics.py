@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from blesim.fidelity.comparison import Panel, distribution
+from blesim.fidelity.comparison import Panel, correlation_panel, distribution
 from blesim.fidelity.correlation import autocorrelation, correlation_between_places
 from blesim.fidelity.levels import (
     drift_db,
@@ -15,7 +15,7 @@ from blesim.fidelity.levels import (
     level_noise_db,
     level_spread_db,
 )
-from blesim.fidelity.links import Link, links_of, median_over
+from blesim.fidelity.links import Link, links_of
 from blesim.fidelity.path_fit import PathFit, fit_path
 from blesim.fidelity.reception import gap_s, received_share, reception_at
 from blesim.fidelity.scorecard import Statistic
@@ -245,26 +245,13 @@ def _gaps_s(links: Sequence[Link], longest_s: float) -> Numbers:
 
 
 def _autocorrelation_panel(title: str, real: Sequence[Link], simulated: Sequence[Link]) -> Panel:
-    lags_s = EVENT_S * np.arange(1, 13)
-    curves = [
-        [
-            median_over(
-                [
-                    autocorrelation(link.time_s, _residual_db(link), lag - 0.15, lag + 0.15)
-                    for link in side
-                ]
-            )
-            for lag in lags_s.tolist()
-        ]
-        for side in (real, simulated)
-    ]
-    return Panel(
-        title=f"{title}: correlation over time",
-        x_label="lag [s]",
-        y_label="autocorrelation, median link [-]",
-        kind="curve",
-        real=np.array([lags_s, curves[0]]),
-        simulated=np.array([lags_s, curves[1]]),
+    return correlation_panel(
+        f"{title}: correlation over time",
+        "link",
+        EVENT_S * np.arange(1.0, 13.0, dtype=np.float64),
+        lambda links, lag_s: [_alike(link, lag_s) for link in links],
+        real,
+        simulated,
     )
 
 

@@ -7,9 +7,8 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from blesim.fidelity.comparison import Panel, distribution
+from blesim.fidelity.comparison import Panel, correlation_panel, distribution
 from blesim.fidelity.correlation import autocorrelation, channel_correlation, decay_time_s
-from blesim.fidelity.links import median_over
 from blesim.fidelity.reception import gap_s
 from blesim.fidelity.scorecard import Statistic
 from blesim.venue.beacons import CHANNELS
@@ -171,25 +170,15 @@ def _centred(cell: Cell, channel: int) -> Numbers:
 
 
 def _memory_panel(room: str, real: Sequence[Cell], simulated: Sequence[Cell]) -> Panel:
-    lags_s = np.arange(0.125, 6.0, 0.25)
-    curves = [
-        [
-            median_over(
-                [
-                    autocorrelation(*cell.on(channel), lag - 0.125, lag + 0.125)
-                    for cell in side
-                    for channel in CHANNELS
-                ]
-            )
-            for lag in lags_s.tolist()
-        ]
-        for side in (real, simulated)
-    ]
-    return Panel(
-        title=f"{room}: correlation over time, standing",
-        x_label="lag [s]",
-        y_label="autocorrelation, median channel [-]",
-        kind="curve",
-        real=np.array([lags_s, curves[0]]),
-        simulated=np.array([lags_s, curves[1]]),
+    return correlation_panel(
+        f"{room}: correlation over time, standing",
+        "channel",
+        np.arange(0.125, 6.0, 0.25),
+        lambda cells, lag_s: [
+            autocorrelation(*cell.on(channel), lag_s - 0.125, lag_s + 0.125)
+            for cell in cells
+            for channel in CHANNELS
+        ],
+        real,
+        simulated,
     )

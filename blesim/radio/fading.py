@@ -19,8 +19,7 @@ SPEED_OF_LIGHT_M_S = 299_792_458.0
 # Of the middle channel, for all three: waves that channels share must not fall out of step because
 # their frequencies differ by 3 %.
 WAVELENGTH_M = SPEED_OF_LIGHT_M_S / FREQUENCY_HZ[38]
-# Of the waves, this many come from each direction that all channels share, and as many that one
-# channel has alone.
+# Scattered waves that all channels of a beacon share; each channel has as many of its own besides.
 WAVES = 4
 _FAINTEST = 1e-6
 

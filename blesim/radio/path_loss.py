@@ -11,19 +11,18 @@ NEAREST_M = 0.1
 
 
 class IndoorModel(NamedTuple):
-    """Coefficients of ITU-R P.1238-11, and its spread. [-], [dB], [-], [dB]."""
+    """Coefficients of ITU-R P.1238-11. [-], [dB], [-]."""
 
     alpha: float
     beta: float
     gamma: float
-    sigma_db: float
 
 
 # ITU-R P.1238-11, line of sight, 300 MHz to 83.5 GHz and 450 MHz to 300 GHz.
 ITU_P1238 = MappingProxyType(
     {
-        "itu-corridor": IndoorModel(1.63, 28.12, 2.25, 4.07),
-        "itu-office": IndoorModel(1.46, 34.62, 2.03, 3.76),
+        "itu-corridor": IndoorModel(1.63, 28.12, 2.25),
+        "itu-office": IndoorModel(1.46, 34.62, 2.03),
     }
 )
 
