@@ -85,6 +85,15 @@ _PI_ROUNDED_UP = 3.15
 KINDS = (("survey", 0), ("walk", 1))
 STATES = (("standing", 0), ("walking", 1), ("turning", 2))
 FEET = (("left", 0), ("right", 1))
+CARRYINGS = (
+    ("hand", 0),
+    ("flat", 1),
+    ("swinging", 2),
+    ("pocket", 3),
+    ("bag", 4),
+    ("trolley", 5),
+)
+ROLES = (("shopper", 0), ("staff", 1), ("tester", 2))
 PROXIMITIES = (("not_told", PROXIMITY_NOT_TOLD), ("immediate", 1), ("near", 2), ("far", 3))
 BEACON_EVENTS = (
     ("dies", 0),
@@ -280,6 +289,29 @@ STEPS = Stream(
     row="one step event of the phone",
     columns=_step_columns("as the phone reads it"),
 )
+HEADING = Stream(
+    name="heading",
+    group="/heading",
+    row="one heading that the phone's system makes of its sensors",
+    columns=(_time("time of the heading"), _heading("heading as the system tells it")),
+)
+PRESSURE = Stream(
+    name="pressure",
+    group="/pressure",
+    row="one sample of the phone's barometer",
+    columns=(
+        _time("time of the sample"),
+        Column(
+            name="pressure",
+            field="pressure_hpa",
+            dtype="float32",
+            units="hPa",
+            long_name="air pressure",
+            valid_range=(200, 1200),
+            decimals=4,
+        ),
+    ),
+)
 MARKS = Stream(
     name="marks",
     group="/marks",
@@ -294,7 +326,7 @@ MARKS = Stream(
 TRAJECTORY = Stream(
     name="trajectory",
     group="/truth/trajectory",
-    row="one knot of the walk; position, heading and offset are linear between knots",
+    row="one knot of the walk; until the next the way is straight, the acceleration constant",
     columns=(
         _time("time of the knot"),
         _metres("x", "true x"),
@@ -306,8 +338,17 @@ TRAJECTORY = Stream(
             field="speed_m_s",
             dtype="float64",
             units="m s-1",
-            long_name="true speed until the next knot",
+            long_name="true speed at the knot",
             valid_range=(0, 20),
+            decimals=6,
+        ),
+        Column(
+            name="acceleration",
+            field="acceleration_m_s2",
+            dtype="float64",
+            units="m s-2",
+            long_name="change of the speed until the next knot",
+            valid_range=(-20, 20),
             decimals=6,
         ),
         _EDGE,
@@ -317,7 +358,7 @@ TRAJECTORY = Stream(
             field="edge_speed_m_s",
             dtype="float64",
             units="m s-1",
-            long_name="change of the offset until the next knot, + towards the edge's second node",
+            long_name="mean change of the offset until the next knot, + towards the second node",
             valid_range=(-20, 20),
             decimals=6,
             missing=True,
@@ -396,6 +437,60 @@ PACKETS = Stream(
         ),
     ),
 )
+CARRYING = Stream(
+    name="carrying",
+    group="/truth/carrying",
+    row="one way of carrying the phone, from its time on",
+    columns=(
+        _time("time from which the phone is carried so"),
+        Column(
+            name="carrying",
+            field="carrying",
+            dtype="uint8",
+            units="1",
+            long_name="how the phone is carried until the next row",
+            flags=CARRYINGS,
+        ),
+    ),
+)
+CROWD = Stream(
+    name="crowd",
+    group="/truth/crowd",
+    row=TRAJECTORY.row,
+    columns=TRAJECTORY.columns,
+)
+VISITS = Stream(
+    name="visits",
+    group="/truth/visits",
+    row="one person who stopped at a product section",
+    columns=(
+        _time("time of arrival"),
+        Column(
+            name="person",
+            field="person",
+            dtype="int32",
+            units="1",
+            long_name="row of /truth/people",
+            valid_range=(0, 2**31 - 1),
+        ),
+        Column(
+            name="section",
+            field="section",
+            dtype="int32",
+            units="1",
+            long_name="product section, counted in /venue/built from 0",
+            valid_range=(0, 2**31 - 1),
+        ),
+        Column(
+            name="dwell",
+            field="dwell_us",
+            dtype="int64",
+            units="microseconds",
+            long_name="how long the person stood there",
+            valid_range=(0, _TIME_LIMIT_US),
+        ),
+    ),
+)
 BEACON_HISTORY = Stream(
     name="beacon_events",
     group="/truth/beacon_events",
@@ -435,10 +530,10 @@ TRACK = Stream(
     ),
 )
 
-OBSERVATIONS = (RSSI, IMU, STEPS, MARKS)
-TRUTH = (TRAJECTORY, STEP_TRUTH, PACKETS)
+OBSERVATIONS = (RSSI, IMU, STEPS, MARKS, HEADING, PRESSURE)
+TRUTH = (TRAJECTORY, STEP_TRUTH, PACKETS, CARRYING)
 # What belongs to the whole recording: no walk counts its rows.
-HISTORY = (BEACON_HISTORY,)
+HISTORY = (BEACON_HISTORY, VISITS)
 
 
 def _text(name: str, long_name: str) -> Column:
@@ -561,7 +656,6 @@ EDGES = Stream(
         ),
     ),
 )
-STATIC = (NODES, EDGES, BEACONS, WALKS)
 RUNS = Stream(
     name="runs",
     group="/runs",
@@ -573,3 +667,28 @@ RUNS = Stream(
         _text("failure", "why there is no track; empty where there is one"),
     ),
 )
+PEOPLE = Stream(
+    name="people",
+    group="/truth/people",
+    row="one person who was in the venue while it was open",
+    ascending=False,
+    columns=(
+        _text("person", "name of the person, the walker of /walks where a phone was recorded"),
+        Column(
+            name="role",
+            field="role",
+            dtype="uint8",
+            units="1",
+            long_name="what the person was there for",
+            flags=ROLES,
+        ),
+        _text("group", "who came together; empty for a person alone"),
+    ),
+)
+STATIC = (NODES, EDGES, BEACONS, WALKS)
+# Tables whose rows own stretches of rows of other streams.
+COUNTED = {
+    WALKS.group: (*OBSERVATIONS, *TRUTH),
+    PEOPLE.group: (CROWD,),
+    RUNS.group: (TRACK,),
+}

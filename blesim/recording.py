@@ -1,28 +1,32 @@
 """A recording: what phones observed in a venue. Truth is another object and travels apart."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Self
 
 from blesim import columns
 from blesim.errors import DataError
 from blesim.tables import (
     BeaconHistory,
+    Carrying,
+    Headings,
     Imu,
     Marks,
     Packets,
+    Pressures,
     Readings,
     Steps,
     StepTruth,
     Table,
     Trajectory,
+    Visits,
 )
 from blesim.venue.venue import Venue
 
-SCHEMA_VERSION = "1.1"
+SCHEMA_VERSION = "1.2"
 # What tables call the readings of all walks together; no walk may have this name.
 ALL_WALKS = "all"
 
@@ -42,18 +46,25 @@ class Observations:
     imu: Imu = field(default_factory=Imu.empty)
     steps: Steps = field(default_factory=Steps.empty)
     marks: Marks = field(default_factory=Marks.empty)
+    headings: Headings = field(default_factory=Headings.empty)
+    pressures: Pressures = field(default_factory=Pressures.empty)
 
     def tables(self) -> tuple[Table, ...]:
         """Return the streams in the order of `columns.OBSERVATIONS`."""
-        return (self.readings, self.imu, self.steps, self.marks)
+        return tuple(getattr(self, each.name) for each in fields(self))
+
+    @classmethod
+    def of(cls, tables: Iterable[Table]) -> Self:
+        """Return observations of the streams in the order of `columns.OBSERVATIONS`."""
+        names = [each.name for each in fields(cls)]
+        return cls(**dict(zip(names, tables, strict=True)))  # type: ignore[arg-type]  # in order
 
     def between(self, start_us: int, end_us: int) -> "Observations":
         """Return what happened from `start_us` until just before `end_us`. [us]."""
-        parts = [
+        return Observations.of(
             table.rows(slice(*table[table.STREAM.columns[0]].searchsorted([start_us, end_us])))
             for table in self.tables()
-        ]
-        return Observations(readings=parts[0], imu=parts[1], steps=parts[2], marks=parts[3])  # type: ignore[arg-type]  # rows() keeps each type
+        )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,10 +110,11 @@ class WalkTruth:
     trajectory: Trajectory = field(default_factory=Trajectory.empty)
     steps: StepTruth = field(default_factory=StepTruth.empty)
     packets: Packets = field(default_factory=Packets.empty)
+    carrying: Carrying = field(default_factory=Carrying.empty)
 
     def tables(self) -> tuple[Table, ...]:
         """Return the streams in the order of `columns.TRUTH`."""
-        return (self.trajectory, self.steps, self.packets)
+        return (self.trajectory, self.steps, self.packets, self.carrying)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -161,22 +173,73 @@ class Recording:
         return {walk.name: walk for walk in self.walks}
 
 
+class Role(IntEnum):
+    """What a person is in the venue for."""
+
+    SHOPPER = dict(columns.ROLES)["shopper"]
+    STAFF = dict(columns.ROLES)["staff"]
+    TESTER = dict(columns.ROLES)["tester"]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Person:
+    """Somebody who was in the venue while it was open.
+
+    Attributes
+    ----------
+    name : str
+        Unique; the walker of the walks of this person's phone, if one was recorded.
+    role : Role
+        Shopper, staff or tester.
+    group : str
+        Who came together; empty for a person alone.
+    trajectory : Trajectory
+        From the entrance until out again.
+    """
+
+    name: str
+    role: Role
+    group: str = ""
+    trajectory: Trajectory
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crowd:
+    """Everybody who was there, and where they stopped.
+
+    Attributes
+    ----------
+    people : tuple of Person
+        Testers included; empty where nobody but the recorded walkers is known.
+    visits : Visits
+        Stops at product sections, in order of time, by row of the people.
+    """
+
+    people: tuple[Person, ...] = ()
+    visits: Visits = field(default_factory=Visits.empty)
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Truth:
-    """What really happened: the venue as built, what befell its beacons, each walk by its name."""
+    """What really happened: the venue as built, its beacons, everybody, each walk by its name."""
 
     venue: Venue
     walks: MappingProxyType[str, WalkTruth]
     beacon_events: BeaconHistory = field(default_factory=BeaconHistory.empty)
+    crowd: Crowd = field(default_factory=Crowd)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle the walks as what can travel to another process."""
-        return _truth, (self.venue, dict(self.walks), self.beacon_events)
+        return _truth, (self.venue, dict(self.walks), self.beacon_events, self.crowd)
 
 
-def _truth(venue: Venue, walks: dict[str, WalkTruth], beacon_events: BeaconHistory) -> Truth:
+def _truth(
+    venue: Venue, walks: dict[str, WalkTruth], beacon_events: BeaconHistory, crowd: Crowd
+) -> Truth:
     """Return the truth that a pickle holds."""
-    return Truth(venue=venue, walks=MappingProxyType(walks), beacon_events=beacon_events)
+    return Truth(
+        venue=venue, walks=MappingProxyType(walks), beacon_events=beacon_events, crowd=crowd
+    )
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -15,8 +15,9 @@ from blesim.units import wrap_angle
 IntArray = NDArray[np.integer[Any]]
 FloatArray = NDArray[np.floating[Any]]
 Selection = slice | NDArray[np.bool_] | NDArray[np.intp]
-# Stands for a column that was not given, whatever the number of rows.
+# Stand for columns that were not given, whatever the number of rows.
 _NO_PROXIMITY: IntArray = np.empty(0, dtype=np.uint8)
+_STEADY: FloatArray = np.empty(0, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -191,6 +192,24 @@ class Marks(Table):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Headings(Table):
+    """Headings that the phone's system makes of its sensors."""
+
+    STREAM: ClassVar[Stream] = columns.HEADING
+    time_us: IntArray
+    heading_rad: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Pressures(Table):
+    """Samples of the phone's barometer."""
+
+    STREAM: ClassVar[Stream] = columns.PRESSURE
+    time_us: IntArray
+    pressure_hpa: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class StepTruth(Table):
     """Steps the walker really took."""
 
@@ -217,6 +236,32 @@ class Packets(Table):
     fading_db: FloatArray
     body_loss_db: FloatArray
     power_dbm: FloatArray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Carrying(Table):
+    """How a phone was carried; each row holds until the next, the first from the walk's start."""
+
+    STREAM: ClassVar[Stream] = columns.CARRYING
+    time_us: IntArray
+    carrying: IntArray
+
+    def at(self, time_us: IntArray) -> IntArray:
+        """How the phone was carried at the given times, (n,); before the first row as there."""
+        row = np.searchsorted(self.time_us, time_us, side="right") - 1
+        modes: IntArray = self.carrying[np.maximum(row, 0)]
+        return modes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Visits(Table):
+    """Who stopped at which product section, for how long."""
+
+    STREAM: ClassVar[Stream] = columns.VISITS
+    time_us: IntArray
+    person: IntArray
+    section: IntArray
+    dwell_us: IntArray
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -266,9 +311,10 @@ class Poses:
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Trajectory(Table):
-    """An exact walk: knots, between which position, heading and offset are linear in time.
+    """An exact walk: knots, between which the way is straight and the acceleration constant.
 
-    Speed, edge, edge speed and state hold from their knot until the next.
+    Heading turns evenly; edge, state and the mean rate of the offset hold from their knot until
+    the next. Without ``acceleration_m_s2`` every speed is steady.
     """
 
     STREAM: ClassVar[Stream] = columns.TRAJECTORY
@@ -278,10 +324,16 @@ class Trajectory(Table):
     level: IntArray
     heading_rad: FloatArray
     speed_m_s: FloatArray
+    acceleration_m_s2: FloatArray = field(default_factory=lambda: _STEADY)
     edge: IntArray
     offset_m: FloatArray
     edge_speed_m_s: FloatArray
     state: IntArray
+
+    def __post_init__(self) -> None:
+        if self.acceleration_m_s2 is _STEADY:
+            object.__setattr__(self, "acceleration_m_s2", np.zeros(np.size(self.time_us)))
+        Table.__post_init__(self)
 
     def at(self, time_us: IntArray) -> Poses:
         """Poses at the given times.
@@ -305,18 +357,38 @@ class Trajectory(Table):
         following = np.minimum(last + 1, len(self) - 1)
         elapsed_us = (time_us - self.time_us[last]).astype(np.float64)
         span_us = np.maximum(self.time_us[following] - self.time_us[last], 1)
-        share = elapsed_us / span_us
+        turned = elapsed_us / span_us
+        share, along_us = self._walked(last, elapsed_us, span_us)
         turn_rad = wrap_angle(self.heading_rad[following] - self.heading_rad[last])
         return Poses(
             x_m=self.x_m[last] + share * (self.x_m[following] - self.x_m[last]),
             y_m=self.y_m[last] + share * (self.y_m[following] - self.y_m[last]),
             level=self.level[last],
-            heading_rad=wrap_angle(self.heading_rad[last] + share * turn_rad),
-            speed_m_s=self.speed_m_s[last],
+            heading_rad=wrap_angle(self.heading_rad[last] + turned * turn_rad),
+            speed_m_s=self.speed_m_s[last] + self.acceleration_m_s2[last] * elapsed_us * 1e-6,
             edge=self.edge[last],
-            offset_m=self.offset_m[last] + elapsed_us * 1e-6 * self.edge_speed_m_s[last],
+            offset_m=self.offset_m[last] + along_us * 1e-6 * self.edge_speed_m_s[last],
             state=self.state[last],
         )
+
+    def _walked(
+        self, last: IntArray, elapsed_us: FloatArray, span_us: IntArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Share of the way to the next knot, and the time a steady walker needs for it. [us].
+
+        The share is ``(v t + a t^2 / 2) / (v T + a T^2 / 2)``, so that knots are met exactly.
+        """
+        steady = elapsed_us / span_us
+        rate_m_s2 = self.acceleration_m_s2[last]
+        if not rate_m_s2.any():
+            return steady, elapsed_us
+        elapsed_s, span_s = elapsed_us * 1e-6, span_us * 1e-6
+        speed_m_s = self.speed_m_s[last]
+        way_m = (speed_m_s + 0.5 * rate_m_s2 * span_s) * span_s
+        done_m = (speed_m_s + 0.5 * rate_m_s2 * elapsed_s) * elapsed_s
+        moves = (rate_m_s2 != 0) & (way_m > 0)
+        share = np.where(moves, done_m / np.where(moves, way_m, 1.0), steady)
+        return share, np.where(moves, share * span_us, elapsed_us)
 
     def _refuse_outside(self, time_us: IntArray) -> None:
         if len(time_us) == 0:

@@ -13,13 +13,14 @@ COLUMNS = [
     for column in stream.columns
 ]
 # UDUNITS names of everything recorded; a new unit is looked up there before it is added here.
-UNITS = {"1", "microseconds", "s", "m", "m2", "m s-1", "m s-2", "radian", "radian s-1"} | {
+UNITS = {"1", "hPa", "microseconds", "s", "m", "m2", "m s-1", "m s-2", "radian", "radian s-1"} | {
     "dBm",
     "dB",
     "microtesla",
 }
 # What a field's name ends in, for each unit that a name can carry.
 SUFFIX = {
+    "hPa": "_hpa",
     "microseconds": "_us",
     "s": "_s",
     "m": "_m",

@@ -76,7 +76,7 @@ def test_kinds_are_those_of_the_columns() -> None:
 def test_streams_come_in_the_order_of_the_columns() -> None:
     assert [t.STREAM for t in Observations().tables()] == list(columns.OBSERVATIONS)
     assert [t.STREAM for t in WalkTruth().tables()] == list(columns.TRUTH)
-    assert [len(t) for t in (*Observations().tables(), *WalkTruth().tables())] == [0] * 7
+    assert [len(t) for t in (*Observations().tables(), *WalkTruth().tables())] == [0] * 10
 
 
 def test_what_happened_between_two_times() -> None:

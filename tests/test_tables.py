@@ -17,7 +17,11 @@ TABLES = (
     tables.Steps,
     tables.Marks,
     tables.Trajectory,
+    tables.Headings,
+    tables.Pressures,
     tables.StepTruth,
+    tables.Carrying,
+    tables.Visits,
     tables.Packets,
     tables.BeaconHistory,
     tables.Track,
@@ -51,6 +55,11 @@ def random_table(kind: type[Table], rows: int, seed: int) -> Table:
 @pytest.mark.parametrize("kind", TABLES)
 def test_fields_are_the_columns(kind: type[Table]) -> None:
     assert tables.field_names(kind) == tuple(column.field for column in kind.STREAM.columns)
+
+
+def test_a_carrying_mode_holds_until_the_next() -> None:
+    carrying = tables.Carrying(time_us=[10, 20], carrying=[0, 3])
+    assert carrying.at(np.array([0, 10, 19, 20, 99])).tolist() == [0, 0, 0, 3, 3]
 
 
 def test_every_stream_of_the_file_has_its_table() -> None:
@@ -306,3 +315,28 @@ def test_a_track_keeps_its_covariance_unrounded() -> None:
     tiny = 1.23456789e-9
     zero = dict.fromkeys(tables.field_names(Track), np.zeros(1))
     assert Track(**{**zero, "variance_x_m2": [tiny]}).variance_x_m2[0] == tiny
+
+
+def test_an_accelerating_walker_is_where_the_formula_says() -> None:
+    # From rest at 0.5 m/s2 for 4 s: 4 m; then steady at 2 m/s for 1 s.
+    walked = knots(
+        [0, 4_000_000, 5_000_000],
+        x_m=[0.0, 4.0, 6.0],
+        speed_m_s=[0.0, 2.0, 0.0],
+        acceleration_m_s2=[0.5, 0.0, 0.0],
+        offset_m=[10.0, 6.0, 4.0],
+        edge_speed_m_s=[-1.0, -2.0, 0.0],
+    )
+    poses = walked.at(np.array([0, 1_000_000, 2_000_000, 4_000_000, 4_500_000]))
+    np.testing.assert_allclose(poses.x_m, [0.0, 0.25, 1.0, 4.0, 5.0], atol=1e-12)
+    np.testing.assert_allclose(poses.speed_m_s, [0.0, 0.5, 1.0, 2.0, 2.0], atol=1e-12)
+    np.testing.assert_allclose(poses.offset_m, [10.0, 9.75, 9.0, 6.0, 5.0], atol=1e-12)
+
+
+def test_a_walker_who_brakes_to_rest_meets_the_next_knot() -> None:
+    walked = knots(
+        [0, 2_000_000], x_m=[3.0, 5.0], speed_m_s=[2.0, 0.0], acceleration_m_s2=[-1.0, 0.0]
+    )
+    poses = walked.at(np.array([1_000_000, 2_000_000]))
+    np.testing.assert_allclose(poses.x_m, [4.5, 5.0], atol=1e-12)
+    np.testing.assert_allclose(poses.speed_m_s, [1.0, 0.0], atol=1e-12)

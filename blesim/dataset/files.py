@@ -28,12 +28,14 @@ class Disk:
     """What HDF5 writes through; it keeps the first fault and goes on as if nothing had happened.
 
     HDF5 can neither close nor forget a file that it failed to write: the interpreter then crashes
-    at its end. So HDF5 is never told, and the one who writes asks for the fault.
+    at its end. So HDF5 is never told, finds what it believes written when it reads it back, and the
+    one who writes asks for the fault.
     """
 
     def __init__(self, file: FileIO) -> None:
         self.fault: BaseException | None = None
         self._file = file
+        self._unwritten: list[tuple[int, bytes]] = []
 
     def seek(self, offset: int, whence: int = 0) -> int:
         """Go to a place."""
@@ -43,17 +45,32 @@ class Disk:
         """Return the place."""
         return self._file.tell()
 
-    def read(self, size: int = -1) -> bytes:
-        """Read what was written."""
-        return self._file.read(size)
+    def read(self, size: int) -> bytes:
+        """Read what was written, or would have been."""
+        buffer = bytearray(size)
+        return bytes(buffer[: self.readinto(memoryview(buffer))])
 
     def readinto(self, buffer: memoryview) -> int:
-        """Read what was written."""
-        return self._file.readinto(buffer)
+        """Read what was written, or would have been."""
+        if self.fault is None:
+            return self._file.readinto(buffer)
+        start = self._file.tell()
+        buffer[:] = bytes(len(buffer))
+        self._file.readinto(buffer)
+        for place, content in self._unwritten:
+            first, last = max(place, start), min(place + len(content), start + len(buffer))
+            if first < last:
+                buffer[first - start : last - start] = content[first - place : last - place]
+        self._file.seek(start + len(buffer))
+        return len(buffer)
 
     def write(self, content: memoryview) -> int:
         """Write, unless that has failed before."""
+        start = self._file.tell()
         self._try(lambda: write_all(self._file, content))
+        if self.fault is not None:
+            self._unwritten.append((start, bytes(content)))
+            self._file.seek(start + len(content))
         return len(content)
 
     def truncate(self, size: int) -> int:

@@ -15,7 +15,7 @@ from blesim.errors import DataError
 CONVENTIONS = "CF-1.11"
 CHUNK_ROWS = 32_768
 SEAL = "text_sha256"
-RECORDED = (*columns.OBSERVATIONS, *columns.TRUTH)
+RECORDED = columns.COUNTED[columns.WALKS.group]
 VENUE_TEXTS = ("built", "surveyed")
 
 _FILTERS = {
@@ -27,6 +27,7 @@ _FILTERS = {
 _DIMENSIONS = {
     columns.WALKS.group: "trajectory",
     columns.RUNS.group: "trajectory",
+    columns.PEOPLE.group: "trajectory",
     columns.NODES.group: "node",
     columns.EDGES.group: "edge",
     columns.BEACONS.group: "beacon",
@@ -64,7 +65,7 @@ def attributes(column: Column) -> dict[str, str | NDArray[Any]]:
         names, values = zip(*column.flags, strict=True)
         found["flag_values"] = np.array(values, column.numpy_dtype)
         found["flag_meanings"] = " ".join(names)
-    if column is columns.WALKS.columns[0]:
+    if column in (columns.WALKS.columns[0], columns.PEOPLE.columns[0]):
         found["cf_role"] = "trajectory_id"
     return found
 

@@ -22,22 +22,31 @@ from blesim.dataset.columns_in import (
 from blesim.dataset.files import RECORDING, opened
 from blesim.dataset.provenance import read_provenance
 from blesim.errors import DataError
-from blesim.recording import Observations, Recording, Truth, Walk, WalkKind, WalkTruth
+from blesim.recording import (
+    Crowd,
+    Observations,
+    Person,
+    Recording,
+    Role,
+    Truth,
+    Walk,
+    WalkKind,
+    WalkTruth,
+)
 from blesim.tables import (
     BeaconHistory,
-    Imu,
-    Marks,
+    Carrying,
     Packets,
-    Readings,
-    Steps,
     StepTruth,
     Table,
     Trajectory,
+    Visits,
 )
 from blesim.venue.geojson import from_geojson
 from blesim.venue.venue import Venue
 
 AnyTable = TypeVar("AnyTable", bound=Table)
+_OBSERVED = [type(table) for table in Observations().tables()]
 
 
 def read_recording(path: Path) -> Recording:
@@ -83,22 +92,29 @@ def read_truth(path: Path) -> Truth:
             raise DataError("holds no truth; nothing can be scored against it")
         for name, trajectory in zip(names, trajectories, strict=True):
             _refuse_bad_places(name, trajectory, venue)
-        steps = read_tables(file, columns.WALKS, StepTruth)
-        packets = read_tables(file, columns.WALKS, Packets)
+        rest = zip(
+            read_tables(file, columns.WALKS, StepTruth),
+            read_tables(file, columns.WALKS, Packets),
+            read_tables(file, columns.WALKS, Carrying),
+            strict=True,
+        )
         walks = {
-            name: WalkTruth(trajectory=trajectory, steps=of_steps, packets=of_packets)
-            for name, trajectory, of_steps, of_packets in zip(
-                names, trajectories, steps, packets, strict=True
+            name: WalkTruth(trajectory=trajectory, steps=steps, packets=packets, carrying=carrying)
+            for name, trajectory, (steps, packets, carrying) in zip(
+                names, trajectories, rest, strict=True
             )
         }
         return Truth(
             venue=venue,
             walks=MappingProxyType(walks),
-            beacon_events=_history(file),
+            beacon_events=_history(file, BeaconHistory),
+            crowd=_crowd(file, venue),
         )
 
 
-def read_tables(file: h5py.File, counting: Stream, table: type[AnyTable]) -> list[AnyTable]:
+def read_tables(
+    file: h5py.File, counting: Stream, table: type[AnyTable], stream: Stream | None = None
+) -> list[AnyTable]:
     """One table for each row of the counting table, all of them views of the same columns.
 
     Parameters
@@ -106,16 +122,18 @@ def read_tables(file: h5py.File, counting: Stream, table: type[AnyTable]) -> lis
     file : h5py.File
         Open for reading.
     counting : Stream
-        The table with the row sizes: ``/walks``, or ``/runs`` of tracks.
+        The table with the row sizes: ``/walks``, ``/truth/people``, or ``/runs`` of tracks.
     table : type of Table
-        Which stream.
+        Which kind.
+    stream : Stream, optional
+        Where it lies, if not where such tables usually do.
 
     Raises
     ------
     DataError
         If columns are missing or wrong, or times go backwards within a walk.
     """
-    stream = table.STREAM
+    stream = stream or table.STREAM
     whole = read_stream(file, stream)
     starts = read_starts(file, counting, stream, len(whole[0]))
     row = first_step_back(whole[0], starts)
@@ -143,12 +161,28 @@ def _refuse_bad_places(walk: str, trajectory: Trajectory, venue: Venue) -> None:
         raise DataError(f"walk '{walk}': {group}/offset is not known on every edge")
 
 
-def _history(file: h5py.File) -> BeaconHistory:
-    stream = BeaconHistory.STREAM
-    whole = read_stream(file, stream)
-    return BeaconHistory(
-        **{column.field: values for column, values in zip(stream.columns, whole, strict=True)}
+def _history(file: h5py.File, table: type[AnyTable]) -> AnyTable:
+    whole = read_stream(file, table.STREAM)
+    pairs = zip(table.STREAM.columns, whole, strict=True)
+    return table(**{column.field: values for column, values in pairs})
+
+
+def _crowd(file: h5py.File, venue: Venue) -> Crowd:
+    name, role, group = columns.PEOPLE.columns
+    people = zip(
+        read_texts(file, columns.PEOPLE, name),
+        read_column(file, columns.PEOPLE, role).tolist(),
+        read_texts(file, columns.PEOPLE, group),
+        read_tables(file, columns.PEOPLE, Trajectory, columns.CROWD),
+        strict=True,
     )
+    found = [
+        Person(name=who, role=Role(what), group=with_whom, trajectory=trajectory)
+        for who, what, with_whom, trajectory in people
+    ]
+    for person in found:
+        _refuse_bad_places(person.name, person.trajectory, venue)
+    return Crowd(people=tuple(found), visits=_history(file, Visits))
 
 
 def _venue(file: h5py.File, which: str) -> Venue:
@@ -180,13 +214,7 @@ def _walks(file: h5py.File) -> tuple[Walk, ...]:
 
 def _observations(file: h5py.File) -> Sequence[Observations]:
     streams = zip(
-        read_tables(file, columns.WALKS, Readings),
-        read_tables(file, columns.WALKS, Imu),
-        read_tables(file, columns.WALKS, Steps),
-        read_tables(file, columns.WALKS, Marks),
+        *(read_tables(file, columns.WALKS, table) for table in _OBSERVED),
         strict=True,
     )
-    return [
-        Observations(readings=readings, imu=imu, steps=steps, marks=marks)
-        for readings, imu, steps, marks in streams
-    ]
+    return [Observations.of(tables) for tables in streams]

@@ -17,7 +17,8 @@ A recording is one HDF5 file (schema version {SCHEMA_VERSION},
 stream is one flat table for all walks: the rows of the first walk, then those of the second, and
 so on; `/walks` holds one row a walk and says in `<stream>_row_size` how many rows of each stream
 are its own; `/truth/beacon_events` belongs to all of them. Times ascend within a walk. A stream
-that nobody recorded has no rows.
+that nobody recorded has no rows. Where a whole store was simulated, `/truth/people` holds one row
+for everybody who was there, in the same way, and `/truth/crowd` their trajectories.
 
 ```python
 rssi = xarray.open_dataset("a.h5", group="rssi", decode_timedelta=False)
@@ -47,14 +48,20 @@ What estimators made of a recording, under the same rules. Root attributes: `Con
 
 def schema_page() -> str:
     """Markdown of every group and column of recordings and tracks."""
-    recording = (*columns.STATIC, *RECORDED, *columns.HISTORY)
+    recording = (
+        *columns.STATIC,
+        *RECORDED,
+        *columns.HISTORY,
+        columns.PEOPLE,
+        columns.CROWD,
+    )
     parts = [_INTRODUCTION, *map(_section, recording), _TRACKS]
     parts += map(_section, (columns.RUNS, columns.TRACK))
     return "\n".join(parts)
 
 
 def _section(stream: Stream) -> str:
-    counted = {columns.WALKS: RECORDED, columns.RUNS: (columns.TRACK,)}.get(stream, ())
+    counted = columns.COUNTED.get(stream.group, ())
     rows = [*stream.columns, *map(row_size, counted)]
     head = [
         f"## `{stream.group}`",

@@ -5,7 +5,7 @@ from typing import Any
 
 from blesim import columns
 from blesim.columns import Stream
-from blesim.recording import Walk
+from blesim.recording import Person, Walk
 from blesim.venue.beacons import Beacon
 from blesim.venue.graph import AisleGraph
 from blesim.venue.venue import Venue
@@ -28,6 +28,15 @@ def venue_tables(venue: Venue) -> list[tuple[Stream, Values]]:
 def walk_values(walks: Sequence[Walk]) -> Values:
     """Columns of ``/walks``; observations are not looked at."""
     return [[walk.name for walk in walks], *_fields(columns.WALKS, walks, first=1)]
+
+
+def people_values(people: Sequence[Person]) -> Values:
+    """Columns of ``/truth/people``."""
+    return [
+        [person.name for person in people],
+        [int(person.role) for person in people],
+        [person.group for person in people],
+    ]
 
 
 def _fields(stream: Stream, rows: Sequence[object], first: int = 0) -> Values:

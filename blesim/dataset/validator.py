@@ -80,7 +80,8 @@ def _form(file: h5py.File) -> Iterator[str]:
 
 def _streams(file: h5py.File) -> list[Stream]:
     graph = [stream for stream in (columns.NODES, columns.EDGES) if stream.group in file]
-    return [*graph, columns.BEACONS, columns.WALKS, *RECORDED, *columns.HISTORY]
+    crowd = (columns.PEOPLE, columns.CROWD)
+    return [*graph, columns.BEACONS, columns.WALKS, *RECORDED, *columns.HISTORY, *crowd]
 
 
 def _table(file: h5py.File, stream: Stream) -> Iterator[str]:
@@ -102,10 +103,9 @@ def _columns(stream: Stream) -> Iterator[tuple[Column, Attributes]]:
     """Columns that a table must have, and the attributes of each."""
     for column in stream.columns:
         yield column, attributes(column)
-    if stream is columns.WALKS:
-        for counted in RECORDED:
-            column = row_size(counted)
-            yield column, attributes(column) | sample_dimension(counted)
+    for counted in columns.COUNTED.get(stream.group, ()):
+        column = row_size(counted)
+        yield column, attributes(column) | sample_dimension(counted)
 
 
 def _attributes(
@@ -154,10 +154,11 @@ def _contents(file: h5py.File) -> Iterator[str]:
     yield from _map_tables(file, _venue(file, "surveyed"))
     yield from _names(file)
     starts: dict[str, NDArray[np.int64]] = {}
-    for stream in RECORDED:
+    counted = [(columns.WALKS, stream) for stream in RECORDED]
+    for counting, stream in [*counted, (columns.PEOPLE, columns.CROWD)]:
         time_us = read_column(file, stream, stream.columns[0])
         try:
-            found = read_starts(file, columns.WALKS, stream, len(time_us))
+            found = read_starts(file, counting, stream, len(time_us))
         except DataError as fault:
             yield str(fault)
             continue
@@ -167,16 +168,15 @@ def _contents(file: h5py.File) -> Iterator[str]:
             yield f"{stream.group}/time goes backwards at row {row}"
     yield from _history(file)
     yield from _rows(file)
-    if len(starts) == len(RECORDED):
+    if starts.keys() >= {stream.group for stream in RECORDED}:
         yield from _coverage(file, starts)
 
 
 def _map_tables(file: h5py.File, venue: Venue) -> Iterator[str]:
     tables = venue_tables(venue)
-    missing = {stream.group for stream in _streams(file)} ^ {
-        stream.group for stream, _ in [*tables, (columns.WALKS, [])]
-    }
-    if missing - {stream.group for stream in (*RECORDED, *columns.HISTORY)}:
+    graphs = {columns.NODES.group, columns.EDGES.group}
+    there = {stream.group for stream in _streams(file)}
+    if there & graphs != {stream.group for stream, _ in tables} & graphs:
         yield "the aisle graph is in only one of /venue/surveyed and /venue/edges"
         return
     for stream, values in tables:
@@ -203,20 +203,26 @@ def _history(file: h5py.File) -> Iterator[str]:
 
 
 def _names(file: h5py.File) -> Iterator[str]:
-    names = read_texts(file, columns.WALKS, columns.WALKS.columns[0])
-    if len(set(names)) != len(names):
-        yield "/walks/walk: two walks have the same name"
+    for stream, row in ((columns.WALKS, "walks"), (columns.PEOPLE, "people")):
+        column = stream.columns[0]
+        names = read_texts(file, stream, column)
+        if len(set(names)) != len(names):
+            yield f"{stream.group}/{column.name}: two {row} have the same name"
 
 
 def _rows(file: h5py.File) -> Iterator[str]:
     """Yield the columns that point at rows which the table they point at does not have."""
     surveyed, built = _venue(file, "surveyed"), _venue(file, "built")
     edges = 0 if built.graph is None else len(built.graph.edges)
+    people = len(read_texts(file, columns.PEOPLE, columns.PEOPLE.columns[0]))
     for stream, name, rows in (
         (columns.RSSI, "beacon", len(surveyed.beacons)),
         (columns.PACKETS, "beacon", len(built.beacons)),
         (columns.BEACON_HISTORY, "beacon", len(built.beacons)),
         (columns.TRAJECTORY, "edge", edges),
+        (columns.CROWD, "edge", edges),
+        (columns.VISITS, "person", people),
+        (columns.VISITS, "section", len(built.sections)),
     ):
         values = file[f"{stream.group}/{name}"][()]
         if len(values) and values.max() >= rows:

@@ -24,9 +24,9 @@ from blesim.dataset.layout import (
     write_table,
 )
 from blesim.dataset.provenance import write_provenance
-from blesim.dataset.static_tables import venue_tables, walk_values
+from blesim.dataset.static_tables import people_values, venue_tables, walk_values
 from blesim.errors import DataError
-from blesim.recording import Observations, Provenance, Recording, Truth, Walk, WalkTruth
+from blesim.recording import Crowd, Observations, Provenance, Recording, Truth, Walk, WalkTruth
 from blesim.tables import BeaconHistory, Table
 from blesim.venue.geojson import to_geojson
 from blesim.venue.venue import Venue
@@ -93,6 +93,8 @@ class RecordingWriter:
         What it shows and where it comes from.
     beacon_events : BeaconHistory or None
         What befell the beacons as built, if anything did.
+    crowd : Crowd or None
+        Everybody who was there, if that is known.
 
     Raises
     ------
@@ -110,12 +112,14 @@ class RecordingWriter:
         venue_built: Venue,
         provenance: Provenance,
         beacon_events: BeaconHistory | None = None,
+        crowd: Crowd | None = None,
     ) -> None:
         self._path = path
         self._surveyed = venue_surveyed
         self._built = venue_built
         self._provenance = provenance
         self._history = beacon_events or BeaconHistory.empty()
+        self._crowd = crowd or Crowd()
         self._stack = ExitStack()
         self._walks: dict[str, Walk] = {}
         self._rows: list[list[int]] = []
@@ -181,6 +185,17 @@ class RecordingWriter:
         group_at(file, columns.WALKS.group)
         self._sinks = [Sink(file, stream) for stream in RECORDED]
         write_table(file, columns.BEACON_HISTORY, _values(self._history))
+        self._write_crowd(file)
+
+    def _write_crowd(self, file: h5py.File) -> None:
+        people, visits = self._crowd.people, self._crowd.visits
+        sizes = [len(person.trajectory) for person in people]
+        write_table(file, columns.PEOPLE, people_values(people), [(columns.CROWD, sizes)])
+        write_table(file, columns.VISITS, _values(visits))
+        sink = Sink(file, columns.CROWD)
+        for person in people:
+            sink.append(person.trajectory)
+        sink.finish()
 
     def _complete(self) -> None:
         sizes = zip(*self._rows, strict=True) if self._rows else [()] * len(RECORDED)
@@ -213,6 +228,7 @@ def write_recording(path: Path, recording: Recording, truth: Truth | None = None
         venue_built=truth.venue if truth is not None else recording.venue,
         provenance=recording.provenance,
         beacon_events=truth.beacon_events if truth is not None else None,
+        crowd=truth.crowd if truth is not None else None,
     )
     with writer:
         for walk in recording.walks:

@@ -24,7 +24,7 @@ from blesim.estimators.run import (
 from blesim.estimators.snapshots import global_randomness, inputs_of, same, state_of
 from blesim.recording import Observations, Recording, Walk, WalkKind
 from blesim.rng import Draws
-from blesim.tables import Imu, Marks, Readings, Steps, Track
+from blesim.tables import Imu, Readings, Steps, Track
 
 _SEED = 1
 _RANDOM_CUTS = 12
@@ -311,9 +311,5 @@ def _track(result: object) -> Track:
 
 
 def _after(past: Observations, future: Observations) -> Observations:
-    return Observations(
-        readings=Readings.concatenate([past.readings, future.readings]),
-        imu=Imu.concatenate([past.imu, future.imu]),
-        steps=Steps.concatenate([past.steps, future.steps]),
-        marks=Marks.concatenate([past.marks, future.marks]),
-    )
+    pairs = zip(past.tables(), future.tables(), strict=True)
+    return Observations.of(type(before).concatenate([before, after]) for before, after in pairs)

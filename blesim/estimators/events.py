@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from blesim import columns
 from blesim.recording import Observations
 from blesim.tables import Table
 
@@ -15,9 +16,24 @@ class Event(IntEnum):
     """Streams in the order in which they are taken at one and the same moment."""
 
     IMU = 0
-    STEP = 1
-    MARK = 2
-    READING = 3
+    PRESSURE = 1
+    HEADING = 2
+    STEP = 3
+    MARK = 4
+    READING = 5
+
+
+_STREAMS = {
+    Event.IMU: columns.IMU,
+    Event.PRESSURE: columns.PRESSURE,
+    Event.HEADING: columns.HEADING,
+    Event.STEP: columns.STEPS,
+    Event.MARK: columns.MARKS,
+    Event.READING: columns.RSSI,
+}
+# Row of each stream of `columns.OBSERVATIONS` in the order of `Event`.
+_ORDER = [columns.OBSERVATIONS.index(_STREAMS[event]) for event in Event]
+_BACK = [_ORDER.index(place) for place in range(len(_ORDER))]
 
 
 def event_order(block: Observations) -> tuple[NDArray[np.int8], NDArray[np.int64]]:
@@ -58,15 +74,11 @@ def cut(observations: Observations, ends: Sequence[int]) -> Iterator[Observation
     seen = np.zeros((len(kind) + 1, len(tables)), np.int64)
     np.cumsum(kind[:, None] == np.arange(len(tables)), axis=0, out=seen[1:])
     for first, last in pairwise([0, *ends, len(kind)]):
-        imu, steps, marks, readings = (
-            slice(seen[first, stream], seen[last, stream]) for stream in range(len(tables))
-        )
-        yield Observations(
-            readings=observations.readings.rows(readings),
-            imu=observations.imu.rows(imu),
-            steps=observations.steps.rows(steps),
-            marks=observations.marks.rows(marks),
-        )
+        parts = [
+            table.rows(slice(seen[first, stream], seen[last, stream]))
+            for stream, table in enumerate(tables)
+        ]
+        yield Observations.of(parts[place] for place in _BACK)
 
 
 def one_reading_each(observations: Observations) -> Iterator[Observations]:
@@ -78,4 +90,5 @@ def one_reading_each(observations: Observations) -> Iterator[Observations]:
 
 def _tables(block: Observations) -> tuple[Table, ...]:
     """Return the streams in the order of `Event`."""
-    return (block.imu, block.steps, block.marks, block.readings)
+    tables = block.tables()
+    return tuple(tables[place] for place in _ORDER)

@@ -109,6 +109,7 @@ class Walker:
                 self._level(place.edge),
                 self.heading_rad,
                 speed_m_s,
+                0.0,
                 place.edge,
                 place.offset_m,
                 sign * speed_m_s,

@@ -9,9 +9,12 @@ import shapely
 
 from blesim.columns import BEACON_EVENTS, IMU
 from blesim.recording import (
+    Crowd,
     Observations,
+    Person,
     Provenance,
     Recording,
+    Role,
     Truth,
     Walk,
     WalkKind,
@@ -19,13 +22,17 @@ from blesim.recording import (
 )
 from blesim.tables import (
     BeaconHistory,
+    Carrying,
+    Headings,
     Imu,
     Marks,
     Packets,
+    Pressures,
     Readings,
     Steps,
     StepTruth,
     Trajectory,
+    Visits,
 )
 from blesim.venue.beacons import Beacon
 from blesim.venue.floor_plan import FloorPlan, Level, Obstacle
@@ -91,6 +98,10 @@ def _observations(rng: np.random.Generator, count: int) -> Observations:
             heading_rad=rng.uniform(-3, 3, len(time_us[::10])),
         ),
         marks=Marks(time_us=[0, 5], x_m=[1.0, 2.0], y_m=[5.0, 5.0], level=[0, 0]),
+        headings=Headings(time_us=time_us[::5], heading_rad=rng.uniform(-3, 3, len(time_us[::5]))),
+        pressures=Pressures(
+            time_us=time_us[::7], pressure_hpa=rng.uniform(990, 1010, len(time_us[::7]))
+        ),
     )
 
 
@@ -121,7 +132,25 @@ def _truth(rng: np.random.Generator, observations: Observations) -> WalkTruth:
             power_dbm=rng.uniform(-90, -60, count),
             **{f"{part}_db": rng.normal(size=count) for part in parts},
         ),
+        carrying=Carrying(time_us=[0, end_us // 2], carrying=[0, 3]),
     )
+
+
+def _person(name: str, role: Role, start_us: int) -> Person:
+    walked = Trajectory(
+        time_us=[start_us, start_us + 4_000_000],
+        x_m=[1.0, 3.0],
+        y_m=[5.0, 5.5],
+        level=[0, 0],
+        heading_rad=[0.2, 0.2],
+        speed_m_s=[0.0, 1.03],
+        acceleration_m_s2=[0.2577, 0.0],
+        edge=[0, 0],
+        offset_m=[0.0, 2.0],
+        edge_speed_m_s=[0.5, 0.0],
+        state=[1, 0],
+    )
+    return Person(name=name, role=role, group="family", trajectory=walked)
 
 
 @pytest.fixture(scope="session")
@@ -141,6 +170,10 @@ def truth(recording: Recording, venue: Venue) -> Truth:
             z_m=[1.5, 1.5, 1.5],
             level=[0, 0, 0],
             power_change_db=[-3.0, 0.0, -3.0],
+        ),
+        crowd=Crowd(
+            people=(_person("Ana", Role.SHOPPER, 0), _person("Bo", Role.STAFF, 77)),
+            visits=Visits(time_us=[5, 9], person=[1, 0], section=[0, 0], dwell_us=[0, 3_000_000]),
         ),
     )
 

@@ -86,7 +86,7 @@ def test_version_of_tomorrow(tmp_path: Path, whole: bytes, read: object) -> None
     path.write_bytes(whole)
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = "2.0"
-    assert "schema version 2.0, but this blesim reads 1.1" in _message(read, path)
+    assert "schema version 2.0, but this blesim reads 1.2" in _message(read, path)
 
 
 @pytest.mark.parametrize("read", READERS)

@@ -23,10 +23,10 @@ walks:
 """
 
 COUNTS = {
-    "one": {"rssi": 93, "imu": 0, "steps": 19, "marks": 6},
-    "two": {"rssi": 50, "imu": 0, "steps": 14, "marks": 4},
+    "one": {"rssi": 93, "imu": 0, "steps": 19, "marks": 6, "heading": 0, "pressure": 0},
+    "two": {"rssi": 50, "imu": 0, "steps": 14, "marks": 4, "heading": 0, "pressure": 0},
 }
-DIGEST = "5ea805bb1230fb3b91d204538ce14ae4b0216a90fa4eefbeadbb9849edfd2924"
+DIGEST = "0b83acf95b2164c0a49ca5097b147ca3e5c899516c67e6fe7c8a59cbcf33416e"
 
 
 @pytest.fixture(scope="module")
