@@ -20,7 +20,7 @@ from blesim.radio.passage import Passage
 from blesim.radio.phone import Phone
 from blesim.radio.propagation import Propagation
 from blesim.rng import normals_of
-from blesim.tables import Packets, Readings, Trajectory
+from blesim.tables import Carrying, Packets, Readings, Trajectory
 from blesim.venue.venue import Venue
 
 _FATE = dict(columns.FATES)
@@ -76,7 +76,13 @@ class Air:
         return cls(medium=Medium.over(venue, propagation, seed, until_us, spells, crowd))
 
     def heard_by(
-        self, phone: Phone, walker: str, trajectory: Trajectory, *, keep_packets: bool
+        self,
+        phone: Phone,
+        walker: str,
+        trajectory: Trajectory,
+        *,
+        keep_packets: bool,
+        carrying: Carrying | None = None,
     ) -> Heard:
         """What a phone hears along a trajectory, which stays on one level.
 
@@ -92,13 +98,21 @@ class Air:
             Where it is carried.
         keep_packets : bool
             Whether to tell the fate and the components of every packet as well.
+        carrying : Carrying, optional
+            From when on the phone is carried how; without it, or for a phone that is not held, as
+            its profile says.
 
         Returns
         -------
         Heard
         """
         passage = Passage(
-            medium=self.medium, phone=phone, walker=walker, trajectory=trajectory, keep=keep_packets
+            medium=self.medium,
+            phone=phone,
+            walker=walker,
+            trajectory=trajectory,
+            keep=keep_packets,
+            carrying=carrying,
         )
         scan, sway = passage.scan(), passage.sway()
         readings, packets = [], []

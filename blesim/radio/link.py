@@ -6,10 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.kernels import kernel
+from blesim.radio.carrying import Carried
 from blesim.radio.fading import FREQUENCY_HZ
-from blesim.radio.packets import Places
 from blesim.radio.path_loss import ITU_P1238, floor_loss_db, indoor_loss_db, log_distance_loss_db
 from blesim.radio.people import body_loss_db
+from blesim.radio.places import Places
 from blesim.radio.propagation import Propagation
 from blesim.venue.beacons import CHANNELS
 
@@ -17,8 +18,9 @@ from blesim.venue.beacons import CHANNELS
 class Geometry(NamedTuple):
     """Links of packets, arrays over n packets; heights count from the phone's floor.
 
-    ``cos_body`` is that of the angle between the carrier's heading and the way to the beacon, NaN
-    where there is no body; ``floors`` lie between.
+    ``cos_body`` is that of the angle between the side of the body where the phone is, ahead if it
+    is in the hand, and the way to the beacon, NaN where there is no body; ``floors`` lie between;
+    ``way`` is a row of `columns.CARRYINGS`.
     """
 
     beacon_m: NDArray[np.float64]
@@ -26,16 +28,18 @@ class Geometry(NamedTuple):
     distance_m: NDArray[np.float64]
     cos_body: NDArray[np.float64]
     floors: NDArray[np.int64]
+    way: NDArray[np.uint8]
 
 
 def geometry_of(
     beacon_m: NDArray[np.float64],
     row: NDArray[np.int64],
     here: Places,
-    height_m: float,
+    carried: Carried,
+    way: NDArray[np.uint8],
     floors: NDArray[np.int64],
 ) -> Geometry:
-    """Links from beacons to the places of a phone.
+    """Links from beacons to a phone.
 
     Parameters
     ----------
@@ -44,9 +48,11 @@ def geometry_of(
     row : ndarray of int64, (n,)
         Beacon of each packet.
     here : Places
-        Of the phone at each packet.
-    height_m : float
-        Of the phone above its floor. [m]
+        Of the carrier at each packet.
+    carried : Carried
+        Where the phone is from there, for each way of carrying it.
+    way : ndarray of uint8, (n,)
+        How it is carried at each packet.
     floors : ndarray of int64, (number of beacons,)
         Between the phone's level and each beacon's. [-]
     """
@@ -57,6 +63,7 @@ def geometry_of(
         distance_m=np.empty(count),
         cos_body=np.empty(count),
         floors=floors[row],
+        way=way,
     )
     _fill_geometry(
         beacon_m,
@@ -65,7 +72,10 @@ def geometry_of(
         here.y_m,
         here.cos_heading,
         here.sin_heading,
-        height_m,
+        way,
+        carried.height_m,
+        carried.ahead_m,
+        carried.side,
         out.beacon_m,
         out.phone_m,
         out.distance_m,
@@ -82,7 +92,10 @@ def _fill_geometry(
     y: NDArray[np.float64],
     cos_heading: NDArray[np.float64],
     sin_heading: NDArray[np.float64],
-    height: float,
+    way: NDArray[np.uint8],
+    height_m: NDArray[np.float64],
+    ahead_m: NDArray[np.float64],
+    side: NDArray[np.float64],
     beacon: NDArray[np.float64],
     phone: NDArray[np.float64],
     distance: NDArray[np.float64],
@@ -91,11 +104,15 @@ def _fill_geometry(
     for k in range(len(row)):
         for axis in range(3):
             beacon[k, axis] = beacons[row[k], axis]
-        phone[k, 0], phone[k, 1], phone[k, 2] = x[k], y[k], height
-        away_x, away_y = beacon[k, 0] - x[k], beacon[k, 1] - y[k]
+        ahead, height = ahead_m[way[k]], height_m[way[k]]
+        here_x, here_y = x[k] + ahead * cos_heading[k], y[k] + ahead * sin_heading[k]
+        phone[k, 0], phone[k, 1], phone[k, 2] = here_x, here_y, height
+        away_x, away_y = beacon[k, 0] - here_x, beacon[k, 1] - here_y
         flat = away_x * away_x + away_y * away_y
         distance[k] = np.sqrt(flat + (beacon[k, 2] - height) ** 2)
-        towards = away_x * cos_heading[k] + away_y * sin_heading[k]
+        before = away_x * cos_heading[k] + away_y * sin_heading[k]
+        left = away_y * cos_heading[k] - away_x * sin_heading[k]
+        towards = before * side[way[k], 0] + left * side[way[k], 1]
         # In three dimensions: straight below a beacon no way of standing is towards it.
         cos_body[k] = towards / max(distance[k], 1e-9)
 
@@ -166,10 +183,15 @@ def path_loss_db(
     return total_db
 
 
-def carrier_loss_db(propagation: Propagation, geometry: Geometry) -> NDArray[np.float64]:
-    """Loss through the carrier's body, none where there is no body, (n,). [dB]."""
+def carrier_loss_db(
+    propagation: Propagation, carried: Carried, geometry: Geometry
+) -> NDArray[np.float64]:
+    """Loss by carrying the phone as it is carried, (n,); a body unknown shadows nothing. [dB]."""
     loss_db = body_loss_db(geometry.cos_body, propagation.people.body_loss_db)
-    return np.where(np.isnan(loss_db), 0.0, loss_db)
+    shadow_db = np.where(np.isnan(loss_db), 0.0, loss_db)
+    way = geometry.way if carried.timeline is not None else 0
+    total_db: NDArray[np.float64] = carried.body_share[way] * shadow_db + carried.loss_db[way]
+    return total_db
 
 
 def antenna_gain_db(antenna: NDArray[np.float64], geometry: Geometry) -> NDArray[np.float64]:

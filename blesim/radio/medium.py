@@ -9,14 +9,15 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from blesim.radio.advertising import PACKETS_PER_EVENT, clock_name, event_times_us
+from blesim.radio.advertising import LONGEST_DELAY_US, PACKETS_PER_EVENT, Clock
+from blesim.radio.crowd import Crowd
 from blesim.radio.fading import MultipathField
 from blesim.radio.life import Spell
-from blesim.radio.people import Crowd
 from blesim.radio.propagation import Propagation
 from blesim.radio.shadowing import ShadowField
 from blesim.radio.stock import stock_levels
 from blesim.tables import Trajectory
+from blesim.units import to_us
 from blesim.venue.beacons import CHANNELS, Beacon
 from blesim.venue.floor_plan import Obstacle
 from blesim.venue.line_of_sight import LineOfSight
@@ -33,12 +34,8 @@ class Sender:
         As built.
     spell : Spell
         Where and how strong it is, and for how long.
-    clock : str
-        Names the draws of its packets.
-    events_us : ndarray of int64, (n,)
-        Starts of its advertising events in the spell. [us]
-    first_event : int
-        How many events its clock had given before.
+    clock : Clock
+        When it sends; names the draws of its packets.
     shadow : ShadowField
     multipath : tuple of MultipathField
         One a channel, or none.
@@ -46,11 +43,19 @@ class Sender:
 
     beacon: Beacon
     spell: Spell
-    clock: str
-    events_us: NDArray[np.int64]
-    first_event: int
+    clock: Clock
     shadow: ShadowField
     multipath: tuple[MultipathField, ...]
+
+    def events_between(self, begin_us: int, end_us: int) -> tuple[NDArray[np.int64], int]:
+        """Advertising events of the spell in a stretch of time; see `Clock.events_between`."""
+        spell = self.spell
+        return self.clock.events_between(max(begin_us, spell.start_us), min(end_us, spell.end_us))
+
+    @property
+    def events_per_us(self) -> float:
+        """How many events it gives on average while the spell lasts. [1/us]."""
+        return 1.0 / (to_us(self.spell.interval_s) + LONGEST_DELAY_US / 2)
 
 
 def senders_of(
@@ -62,19 +67,16 @@ def senders_of(
 ) -> tuple[Sender, ...]:
     """Senders of all spells, in their order; spells of one boot share a clock."""
     senders: list[Sender] = []
-    for (row, boot), group in groupby(spells, lambda spell: (spell.beacon, spell.boot)):
+    for (row, _), group in groupby(spells, lambda spell: (spell.beacon, spell.boot)):
         beacon, run = beacons[row], list(group)
-        times_us = event_times_us(run[0], beacon.id, propagation.advertising, seed, until_us)
+        clock = Clock.of(run[0], beacon.id, propagation.advertising, seed, until_us)
         for spell in run:
-            first, beyond = np.searchsorted(times_us, [spell.start_us, spell.end_us])
             place = _place_name(beacon, spell)
             senders.append(
                 Sender(
                     beacon=beacon,
                     spell=spell,
-                    clock=clock_name(beacon.id, boot),
-                    events_us=times_us[first:beyond],
-                    first_event=int(first),
+                    clock=clock,
                     shadow=ShadowField.draw(propagation.shadowing, seed, place),
                     multipath=_multipath(propagation, seed, place),
                 )
@@ -162,8 +164,8 @@ class Medium:
 
     @cached_property
     def packets_per_us(self) -> float:
-        """How many packets all senders together send. [1/us]."""
-        events = sum(len(sender.events_us) for sender in self.senders)
+        """How many packets all senders together send, on average. [1/us]."""
+        events = sum((s.spell.end_us - s.spell.start_us) * s.events_per_us for s in self.senders)
         return events * PACKETS_PER_EVENT / max(self.until_us, 1)
 
     @cached_property

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.radio.advertising import PACKETS_PER_EVENT
+from blesim.radio.carrying import Carried, WaysOfCarrying
 from blesim.radio.link import (
     Budget,
     Geometry,
@@ -16,15 +17,18 @@ from blesim.radio.link import (
     path_loss_db,
 )
 from blesim.radio.medium import Medium, Sender
-from blesim.radio.packets import Scan, Sent, packets_sent, places
+from blesim.radio.packets import Scan, Sent, packets_sent
 from blesim.radio.people import SWAY_STEP_US, sway_m
 from blesim.radio.phone import Phone
+from blesim.radio.places import places
 from blesim.rng import Draws
-from blesim.tables import Trajectory
+from blesim.tables import Carrying, Trajectory
 from blesim.venue.beacons import CHANNELS
 
 # Packets that are worked on at a time: it bounds the memory, and changes no number.
 BLOCK_PACKETS = 300_000
+# Time that is worked on at once, where few packets are sent: it bounds the places of a crowd.
+LONGEST_BLOCK_US = 1_800_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,6 +47,8 @@ class Passage:
         Where, on one level.
     keep : bool
         Whether packets that nobody listened to are wanted too.
+    carrying : Carrying or None
+        From when on it is carried how; in the hand throughout without it.
     """
 
     medium: Medium
@@ -50,6 +56,7 @@ class Passage:
     walker: str
     trajectory: Trajectory
     keep: bool
+    carrying: Carrying | None = None
 
     @property
     def level(self) -> int:
@@ -74,12 +81,30 @@ class Passage:
         people = self.medium.propagation.people
         if not self.phone.held or people.sway_m == 0:
             return np.empty((0, 2))
-        return sway_m(people, self.medium.seed, self.walker, *self.span_us)
+        sway = sway_m(people, self.medium.seed, self.walker, *self.span_us)
+        carried, steps = self.carried(), np.arange(len(sway))
+        sways = carried.sways[carried.ways_at(self.span_us[0] + steps * SWAY_STEP_US)]
+        return np.where(sways[:, np.newaxis], sway, 0.0)
+
+    def carried(self) -> Carried:
+        """How the phone is carried; on a tripod nothing but its own height counts."""
+        if not self.phone.held:
+            return WaysOfCarrying().carried(None, self.phone.height_m)
+        ways = self.medium.propagation.people.carrying
+        carried = ways.carried(self.carrying, self.phone.height_m)
+        if self._heads():
+            return carried
+        return carried._replace(ahead_m=np.zeros_like(carried.ahead_m))
+
+    def _heads(self) -> bool:
+        """Whether it is known which way the carrier looks."""
+        return not np.any(np.isnan(self.trajectory.heading_rad))
 
     def blocks(self) -> Iterator[tuple[int, int]]:
         """Stretches of time with few enough packets, in which shelves stay as they are. [us]."""
         hold_us = self.medium.propagation.stock.hold_us
         longest_us = int(BLOCK_PACKETS / max(self.medium.packets_per_us, 1e-6))
+        longest_us = min(longest_us, LONGEST_BLOCK_US)
         begin_us, last_us = self.span_us
         while begin_us < last_us:
             end_us = min(begin_us + longest_us, (begin_us // hold_us + 1) * hold_us, last_us)
@@ -91,10 +116,10 @@ class Passage:
         duration_us, spacing_us = sender.beacon.packet_duration_us, self.medium.spacing_us(sender)
         end_us = min(end_us, self.span_us[1] - duration_us)
         earliest_us = begin_us - PACKETS_PER_EVENT * spacing_us
-        first, beyond = np.searchsorted(sender.events_us, [earliest_us, end_us])
+        events_us, first = sender.events_between(earliest_us, end_us)
         return packets_sent(
-            sender.events_us[first:beyond],
-            sender.first_event + int(first),
+            events_us,
+            first,
             spacing_us,
             duration_us,
             (max(begin_us, self.span_us[0]), end_us),
@@ -106,7 +131,10 @@ class Passage:
         """Four numbers for each packet, (n, 4): fading, noise, random loss, sensitivity edge."""
         parts = [
             Draws(
-                seed=self.medium.seed, purpose="packet", walker=self.walker, beacon=sender.clock
+                seed=self.medium.seed,
+                purpose="packet",
+                walker=self.walker,
+                beacon=sender.clock.name,
             ).uniforms(packets.ordinal)
             for sender, packets in zip(self.medium.senders, sent, strict=True)
         ]
@@ -116,12 +144,14 @@ class Passage:
         self, time_us: NDArray[np.int64], row: NDArray[np.int64], sway: NDArray[np.float64]
     ) -> Geometry:
         """Links of packets that senders of given rows sent at given times."""
+        carried = self.carried()
         floors = self.medium.level - self.level
         beacon_m = self.medium.xyz_m.copy()
         beacon_m[:, 2] += floors * self.medium.propagation.level_height_m
         here = places(self.trajectory, time_us, sway, SWAY_STEP_US)
-        links = geometry_of(beacon_m, row, here, self.phone.height_m, np.abs(floors))
-        in_the_way = self.phone.held and not np.any(np.isnan(self.trajectory.heading_rad))
+        way = carried.ways_at(time_us)
+        links = geometry_of(beacon_m, row, here, carried, way, np.abs(floors))
+        in_the_way = self.phone.held and self._heads()
         return links if in_the_way else links._replace(cos_body=np.full(len(row), np.nan))
 
     def budget(
@@ -145,7 +175,8 @@ class Passage:
             obstacle_loss_db=obstacles_db,
             shadowing_db=shadowing_db,
             fading_db=fading_db + propagation.fading.of_packets_db(deviates),
-            body_loss_db=carrier_loss_db(propagation, geometry) + self._crowd_db(time_us, geometry),
+            body_loss_db=carrier_loss_db(propagation, self.carried(), geometry)
+            + self._crowd_db(time_us, geometry),
             gains_db=self._gains_db(geometry, row, channel),
         )
 
@@ -165,7 +196,7 @@ class Passage:
     def _crowd_db(self, time_us: NDArray[np.int64], geometry: Geometry) -> NDArray[np.float64]:
         crossing_db = self.medium.propagation.people.crossing_db
         crowd = self.medium.crowds.get(self.level)
-        if crossing_db == 0 or crowd is None or set(crowd.row_of) <= {self.walker}:
+        if crossing_db == 0 or crowd is None or set(crowd.trajectories) <= {self.walker}:
             return np.zeros(len(time_us))
         crossings = crowd.crossings(time_us, geometry.phone_m, geometry.beacon_m, self.walker)
         return crossing_db * crossings.astype(np.float64)

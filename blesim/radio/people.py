@@ -1,22 +1,15 @@
-"""People on the link: the carrier's own body, how a standing person sways, and the others."""
-
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Self
+"""People on the link: the carrier's own body, and how a standing person sways."""
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
 from blesim.kernels import kernel
+from blesim.radio.carrying import WaysOfCarrying
 from blesim.rng import Draws
 from blesim.settings import Settings
-from blesim.tables import Trajectory
 
 SWAY_STEP_US = 100_000
-CROWD_STEP_US = 500_000
-PERSON_RADIUS_M = 0.25
-PERSON_HEIGHT_M = 1.75
 
 
 class People(Settings):
@@ -35,12 +28,15 @@ class People(Settings):
     crossing_db : float
         Loss of each other person on the line of sight; assumed. A dense crowd was measured to move
         the level by up to 16.5. [dB]
+    carrying : WaysOfCarrying
+        What carrying the phone otherwise than in the hand changes.
     """
 
     body_loss_db: float = Field(default=8.0, ge=0, le=40)
     sway_m: float = Field(default=0.015, ge=0, le=0.5)
     sway_s: float = Field(default=2.0, gt=0, le=60)
     crossing_db: float = Field(default=4.0, ge=0, le=40)
+    carrying: WaysOfCarrying = WaysOfCarrying()
 
 
 def body_loss_db(cosine_to_beacon: NDArray[np.float64], body_loss_db: float) -> NDArray[np.float64]:
@@ -89,96 +85,3 @@ def _remember(deviates: NDArray[np.float64], kept: float) -> None:
     for row in range(1, len(deviates)):
         for axis in range(deviates.shape[1]):
             deviates[row, axis] = kept * deviates[row - 1, axis] + new * deviates[row, axis]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Crowd:
-    """Where everybody is, every half second: rows first[k] to first[k + 1] are there in step k."""
-
-    first: NDArray[np.int64]
-    walker: NDArray[np.int64]
-    xy_m: NDArray[np.float64]
-    row_of: Mapping[str, int]
-
-    @classmethod
-    def of(cls, trajectories: Mapping[str, Trajectory]) -> Self:
-        """The crowd of some walkers by name; may be empty."""
-        parts = [_present(row, trajectory) for row, trajectory in enumerate(trajectories.values())]
-        step = np.concatenate([np.empty(0, np.int64), *(part[0] for part in parts)])
-        walker = np.concatenate([np.empty(0, np.int64), *(part[1] for part in parts)])
-        xy_m = np.concatenate([np.empty((0, 2)), *(part[2] for part in parts)])
-        order = np.argsort(step, kind="stable")
-        count = np.bincount(step) if len(step) else np.zeros(0, np.int64)
-        return cls(
-            first=np.concatenate([[0], np.cumsum(count)]).astype(np.int64),
-            walker=walker[order],
-            xy_m=xy_m[order],
-            row_of={name: row for row, name in enumerate(trajectories)},
-        )
-
-    def crossings(
-        self,
-        time_us: NDArray[np.int64],
-        phone_m: NDArray[np.float64],
-        beacon_m: NDArray[np.float64],
-        walker: str,
-    ) -> NDArray[np.int64]:
-        """How many others stand on each link.
-
-        Parameters
-        ----------
-        time_us : ndarray of int64, (n,)
-            [us]
-        phone_m, beacon_m : ndarray of float64, (n, 3)
-            Ends of the links: x, y, height. [m]
-        walker : str
-            Who carries the phone, and is not counted.
-
-        Returns
-        -------
-        ndarray of int64, (n,)
-        """
-        out = np.zeros(len(time_us), np.int64)
-        own = self.row_of.get(walker, -1)
-        _count_people(time_us, phone_m, beacon_m, self.first, self.walker, self.xy_m, own, out)
-        return out
-
-
-def _present(
-    row: int, trajectory: Trajectory
-) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Steps at which a walker is there, their row, and their places."""
-    first, last = trajectory.time_us[0] // CROWD_STEP_US, trajectory.time_us[-1] // CROWD_STEP_US
-    step = np.arange(first, last + 1)
-    middle_us = step * CROWD_STEP_US + CROWD_STEP_US // 2
-    poses = trajectory.at(np.clip(middle_us, trajectory.time_us[0], trajectory.time_us[-1]))
-    return step, np.full(len(step), row), np.stack([poses.x_m, poses.y_m], axis=1)
-
-
-@kernel
-def _count_people(
-    time_us: NDArray[np.int64],
-    phone_m: NDArray[np.float64],
-    beacon_m: NDArray[np.float64],
-    first: NDArray[np.int64],
-    walker: NDArray[np.int64],
-    xy_m: NDArray[np.float64],
-    own: int,
-    out: NDArray[np.int64],
-) -> None:
-    for row in range(len(time_us)):
-        step = time_us[row] // CROWD_STEP_US
-        if step >= len(first) - 1:
-            continue
-        along_x, along_y = beacon_m[row, 0] - phone_m[row, 0], beacon_m[row, 1] - phone_m[row, 1]
-        square = max(along_x * along_x + along_y * along_y, 1e-12)
-        for person in range(first[step], first[step + 1]):
-            if walker[person] == own:
-                continue
-            to_x, to_y = xy_m[person, 0] - phone_m[row, 0], xy_m[person, 1] - phone_m[row, 1]
-            share = (to_x * along_x + to_y * along_y) / square
-            aside = to_x * along_y - to_y * along_x
-            height_m = phone_m[row, 2] + share * (beacon_m[row, 2] - phone_m[row, 2])
-            near = aside * aside <= PERSON_RADIUS_M * PERSON_RADIUS_M * square
-            if 0.0 < share < 1.0 and near and height_m < PERSON_HEIGHT_M:
-                out[row] += 1

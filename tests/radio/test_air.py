@@ -16,6 +16,7 @@ from blesim.radio.phone import Phone, Receiver, Scanner
 from blesim.radio.propagation import Propagation
 from blesim.radio.shadowing import Shadowing
 from blesim.radio.stock import Stock
+from blesim.tables import Carrying
 from blesim.venue.graph import GraphPosition
 from blesim.walkers.itinerary import Itinerary, Stop
 from blesim.walkers.walker import simulate_walkers
@@ -218,6 +219,23 @@ def test_blocks_change_no_number(section, monkeypatch):
     whole = heard(section, trajectory, Propagation(path_loss_exponent=1.0), Phone())
     monkeypatch.setattr("blesim.radio.passage.BLOCK_PACKETS", 500)
     parts = heard(section, trajectory, Propagation(path_loss_exponent=1.0), Phone())
+    assert parts.packets == whole.packets
+    assert parts.readings == whole.readings
+
+
+def test_short_blocks_change_no_number_among_people_and_pockets(section, monkeypatch):
+    trajectory = walk_along(section, "D8", "E9", "E1", pause_s=3.0)
+    others = {str(n): walk_along(section, "D1", f"D{n}", "E9", "D1") for n in range(2, 9)}
+    carrying = Carrying(time_us=np.array([0, 20_000_000]), carrying=np.array([3, 5]))
+
+    def with_people():
+        until_us, crowd = int(trajectory.time_us[-1]) + 1, {"w": trajectory, **others}
+        air = Air.over(section, Propagation(path_loss_exponent=1.0), SEED, until_us, crowd=crowd)
+        return air.heard_by(Phone(), "w", trajectory, keep_packets=True, carrying=carrying)
+
+    whole = with_people()
+    monkeypatch.setattr("blesim.radio.passage.LONGEST_BLOCK_US", 1_700_000)
+    parts = with_people()
     assert parts.packets == whole.packets
     assert parts.readings == whole.readings
 

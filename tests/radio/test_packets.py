@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from blesim.radio.packets import OTHER_CHANNEL, OUT_OF_WINDOW, RECEIVED, Scan, packets_sent, places
-from blesim.tables import Trajectory
+from blesim.radio.packets import OTHER_CHANNEL, OUT_OF_WINDOW, RECEIVED, Scan, packets_sent
 
 FOREVER = (-(10**9), 10**9)
 
@@ -50,29 +49,3 @@ def test_a_dedicated_receiver_hears_all_channels_while_it_listens():
 def test_packets_outside_the_times_are_left_out():
     packets = sent([0, 10_000, 20_000], Scan(0, 10**8, 10**8, True), (1000, 20_001))
     assert sorted(packets.time_us.tolist()) == [1000, 2000, 10_000, 11_000, 12_000, 20_000]
-
-
-def test_places_are_those_of_the_trajectory():
-    generator = np.random.default_rng(4)
-    count = 40
-    trajectory = Trajectory(
-        time_us=np.cumsum(generator.integers(1, 10**6, count)),
-        x_m=generator.uniform(0, 30, count),
-        y_m=generator.uniform(0, 30, count),
-        level=np.zeros(count, int),
-        heading_rad=generator.uniform(-3.1, 3.1, count),
-        speed_m_s=np.ones(count),
-        edge=np.full(count, -1),
-        offset_m=np.full(count, np.nan),
-        edge_speed_m_s=np.full(count, np.nan),
-        state=np.ones(count, int),
-    )
-    one = np.sort(generator.integers(trajectory.time_us[0], trajectory.time_us[-1] + 1, 500))
-    # Three stretches, each ascending, as the packets of three channels are.
-    time_us = np.concatenate([one, one + 0, one[100:]])
-    found = places(trajectory, time_us, np.empty((0, 2)), 100_000)
-    poses = trajectory.at(time_us)
-    assert np.allclose(found.x_m, poses.x_m, atol=1e-9)
-    assert np.allclose(found.y_m, poses.y_m, atol=1e-9)
-    assert np.allclose(found.cos_heading, np.cos(poses.heading_rad), atol=1e-7)
-    assert np.allclose(found.sin_heading, np.sin(poses.heading_rad), atol=1e-7)
