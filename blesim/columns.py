@@ -321,6 +321,7 @@ MARKS = Stream(
         _metres("x", "x of the way point"),
         _metres("y", "y of the way point"),
         _LEVEL,
+        _heading("heading of the tester, where told", missing=True),
     ),
 )
 TRAJECTORY = Stream(

@@ -17,6 +17,7 @@ FloatArray = NDArray[np.floating[Any]]
 Selection = slice | NDArray[np.bool_] | NDArray[np.intp]
 # Stand for columns that were not given, whatever the number of rows.
 _NO_PROXIMITY: IntArray = np.empty(0, dtype=np.uint8)
+_NO_HEADING: FloatArray = np.empty(0, dtype=np.float64)
 _STEADY: FloatArray = np.empty(0, dtype=np.float64)
 
 
@@ -182,13 +183,22 @@ class Steps(Table):
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Marks(Table):
-    """Way points the tester marked, at their known positions."""
+    """Way points the tester marked, at their known positions.
+
+    Without ``heading_rad`` the tester told none; a survey that stands in several directions does.
+    """
 
     STREAM: ClassVar[Stream] = columns.MARKS
     time_us: IntArray
     x_m: FloatArray
     y_m: FloatArray
     level: IntArray
+    heading_rad: FloatArray = field(default_factory=lambda: _NO_HEADING)
+
+    def __post_init__(self) -> None:
+        if self.heading_rad is _NO_HEADING:
+            object.__setattr__(self, "heading_rad", np.full(np.size(self.time_us), np.nan))
+        Table.__post_init__(self)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

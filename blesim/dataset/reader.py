@@ -112,6 +112,18 @@ def read_truth(path: Path) -> Truth:
         )
 
 
+def read_crowd(path: Path) -> Crowd:
+    """Everybody who was in the venue; nobody where only the recorded walks are known.
+
+    Raises
+    ------
+    DataError
+        As for `read_recording`, and if somebody is where the venue has no aisle.
+    """
+    with opened(path, RECORDING) as file:
+        return _crowd(file, _venue(file, "built"))
+
+
 def read_tables(
     file: h5py.File, counting: Stream, table: type[AnyTable], stream: Stream | None = None
 ) -> list[AnyTable]:

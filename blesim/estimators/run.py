@@ -131,12 +131,18 @@ def visible(observations: Observations) -> Observations:
 
 
 def start_of(walk: Walk) -> StartInfo | None:
-    """Position of the first mark, if it was pressed when the walk began; the heading stays open."""
+    """Place of the first mark, if it was pressed when the walk began, and its heading if told."""
     marks = walk.observations.marks
     begin_us, _ = span_us(walk.observations)
     if not len(marks) or marks.time_us[0] - begin_us > to_us(START_WITHIN_S):
         return None
-    return StartInfo(x_m=float(marks.x_m[0]), y_m=float(marks.y_m[0]), level=int(marks.level[0]))
+    heading_rad = float(marks.heading_rad[0])
+    return StartInfo(
+        x_m=float(marks.x_m[0]),
+        y_m=float(marks.y_m[0]),
+        level=int(marks.level[0]),
+        heading_rad=None if np.isnan(heading_rad) else heading_rad,
+    )
 
 
 def span_us(observations: Observations) -> tuple[int, int]:

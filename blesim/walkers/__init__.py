@@ -1,1 +1,1 @@
-"""Who walks: itineraries and gait as SimPy processes, and the exact trajectories they leave."""
+"""Who walks: scripted testers, shoppers and staff as SimPy processes, and their exact walks."""

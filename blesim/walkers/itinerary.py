@@ -10,6 +10,7 @@ from blesim.venue.graph import GraphPosition, read_only
 from blesim.venue.venue import Venue
 
 _FASTEST_M_S = 10.0
+_QUICKEST_M_S2 = 20.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -65,6 +66,8 @@ class Itinerary:
         Pace. [m/s]
     turn_rate_rad_s : float
         How fast the walker turns on the spot where the way bends. [rad/s]
+    acceleration_m_s2 : float or None
+        How fast the walker gets to the pace and stops again; at once where not given. [m/s2]
     way_points : WayPoints
         Where the tester presses in passing.
     """
@@ -74,6 +77,7 @@ class Itinerary:
     start_s: float = 0.0
     speed_m_s: float = 1.0
     turn_rate_rad_s: float = np.pi
+    acceleration_m_s2: float | None = None
     way_points: WayPoints = field(default_factory=WayPoints)
 
     def __post_init__(self) -> None:
@@ -83,6 +87,11 @@ class Itinerary:
             raise UsageError(f"walker '{self.walker}': speed_m_s must be above 0, up to 10")
         if not self.turn_rate_rad_s > 0.0:
             raise UsageError(f"walker '{self.walker}': turn_rate_rad_s must be positive")
+        if (
+            self.acceleration_m_s2 is not None
+            and not 0.0 < self.acceleration_m_s2 <= _QUICKEST_M_S2
+        ):
+            raise UsageError(f"walker '{self.walker}': acceleration_m_s2 must be above 0, up to 20")
 
 
 def way_points(venue: Venue) -> WayPoints:

@@ -1,9 +1,9 @@
 """A walker as a SimPy process on a clock of whole microseconds, and the log it leaves."""
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import simpy
@@ -15,9 +15,12 @@ from blesim.tables import Marks, Trajectory
 from blesim.units import MICROSECONDS_PER_SECOND, to_us, wrap_angle
 from blesim.venue.graph import SAME_PLACE_M, AisleGraph, GraphPosition, Leg
 from blesim.walkers.itinerary import Itinerary
+from blesim.walkers.motion import limits_m_s
+from blesim.walkers.phases import Phase, passed_us, phases, steady
 
 _STATE = dict(columns.STATES)
 _STRAIGHT_ON_RAD = 1e-9
+_NOWHERE = -1
 
 Process = Generator[simpy.Event, Any, None]
 
@@ -31,91 +34,147 @@ class WalkLog:
 
     def trajectory(self) -> Trajectory:
         """The finished walk."""
-        return Trajectory(**_by_field(columns.TRAJECTORY, self.knots))
+        return Trajectory(**_by_field(columns.TRAJECTORY.columns, self.knots))
 
     def pressed(self) -> Marks:
         """The way points the tester marked."""
-        return Marks(**_by_field(columns.MARKS, self.marks))
+        time_us, x_m, y_m, level = np.array(self.marks, np.float64).reshape(-1, 4).T
+        whole = time_us.astype(np.int64), level.astype(np.int64)
+        return Marks(time_us=whole[0], x_m=x_m, y_m=y_m, level=whole[1])
 
 
-def _by_field(stream: columns.Stream, rows: list[tuple[float, ...]]) -> dict[str, Any]:
-    values = zip(*rows, strict=True) if rows else [() for _ in stream.columns]
-    return {column.field: np.array(v) for column, v in zip(stream.columns, values, strict=True)}
+def _by_field(named: tuple[columns.Column, ...], rows: list[tuple[float, ...]]) -> dict[str, Any]:
+    values = zip(*rows, strict=True) if rows else [() for _ in named]
+    return {column.field: np.array(v) for column, v in zip(named, values, strict=True)}
 
 
 @dataclass(slots=True)
 class Walker:
-    """Somebody on the graph: place, heading, and what they are told to do."""
+    """Somebody on the graph: place, heading, speed, and what they are told to do.
+
+    Attributes
+    ----------
+    present : list of int
+        How many people are on each edge, and nowhere as the last; the walker counts among them.
+    """
 
     graph: AisleGraph
     itinerary: Itinerary
+    present: list[int]
     log: WalkLog = field(default_factory=WalkLog)
     heading_rad: float = 0.0
+    speed_m_s: float = 0.0
+    here: int = _NOWHERE
 
     def walk(self, env: simpy.Environment) -> Process:
         """The process: wait for the start, then stop after stop to the end of the route."""
         stops = self.itinerary.stops
         ways = [self.graph.route(a.place, b.place) for a, b in pairwise(stops)]
+        limits = self._limits(ways)
         first_leg = next((leg for way in ways for leg in way), None)
         if first_leg is not None:
             self.heading_rad = self._heading_of(first_leg)
         yield env.timeout(to_us(self.itinerary.start_s))
+        self._go_to(stops[0].place.edge)
         self._press(env, stops[0].place)
         yield from self._stand(env, stops[0].place, stops[0].pause_s)
         for stop, way in zip(stops[1:], ways, strict=True):
             for leg in way:
                 yield from self._turn(env, leg)
-                yield from self._stride(env, leg)
+                yield from self._stride(env, leg, limits.pop(0))
             yield from self._stand(env, stop.place, stop.pause_s)
         self._knot(env, stops[-1].place, "standing")
+        self._go_to(_NOWHERE)
+
+    def _limits(self, ways: Sequence[Sequence[Leg]]) -> list[float]:
+        """Speed permitted at the end of each leg; the walker stops for pauses and bends. [m/s]."""
+        rate_m_s2 = self.itinerary.acceleration_m_s2
+        legs = [leg for way in ways for leg in way]
+        if rate_m_s2 is None or not legs:
+            return [np.inf] * len(legs)
+        at_end = np.full(len(legs), np.inf)
+        at_end[-1] = 0.0
+        for row, (a, b) in enumerate(pairwise(legs)):
+            if self._angle_rad(self._heading_of(a), self._heading_of(b)) > _STRAIGHT_ON_RAD:
+                at_end[row] = 0.0
+        done = 0
+        for stop, way in zip(self.itinerary.stops[1:], ways, strict=True):
+            done += len(way)
+            if stop.pause_s > 0 and done:
+                at_end[done - 1] = 0.0
+        lengths_m = np.array([leg.length_m for leg in legs])
+        found: list[float] = limits_m_s(lengths_m, at_end, rate_m_s2).tolist()
+        return found
 
     def _stand(self, env: simpy.Environment, place: GraphPosition, pause_s: float) -> Process:
         if pause_s > 0:
+            self.speed_m_s = 0.0
             self._knot(env, place, "standing")
             yield env.timeout(to_us(pause_s))
 
     def _turn(self, env: simpy.Environment, leg: Leg) -> Process:
         new_rad = self._heading_of(leg)
-        angle_rad = abs(float(wrap_angle(new_rad - self.heading_rad)))
+        angle_rad = self._angle_rad(self.heading_rad, new_rad)
         if angle_rad > _STRAIGHT_ON_RAD:
+            self.speed_m_s = 0.0
             self._knot(env, GraphPosition(leg.edge, leg.start_m), "turning")
             yield env.timeout(to_us(angle_rad / self.itinerary.turn_rate_rad_s))
         self.heading_rad = new_rad
 
-    def _stride(self, env: simpy.Environment, leg: Leg) -> Process:
-        duration_us = max(1, to_us(leg.length_m / self.itinerary.speed_m_s))
-        speed_m_s = leg.length_m / duration_us * MICROSECONDS_PER_SECOND
+    def _stride(self, env: simpy.Environment, leg: Leg, limit_m_s: float) -> Process:
+        self._go_to(leg.edge)
+        parts = self._phases(leg, limit_m_s)
+        duration_us = sum(part.duration_us for part in parts)
         sign = 1.0 if leg.end_m > leg.start_m else -1.0
-        self._knot(env, GraphPosition(leg.edge, leg.start_m), "walking", speed_m_s, sign)
         for way_point_m, share in self._way_points_on(leg):
-            time_us = env.now + round(share * duration_us)
+            time_us = env.now + passed_us(parts, share * leg.length_m, share * duration_us)
             self.log.marks.append((time_us, *way_point_m, self._level(leg.edge)))
+        ends_m = [part.way_m for part in parts[1:]] + [leg.length_m]
+        since_us = 0
+        for part, end_m in zip(parts, ends_m, strict=True):
+            place = GraphPosition(leg.edge, leg.start_m + sign * part.way_m)
+            mean_m_s = (end_m - part.way_m) / part.duration_us * MICROSECONDS_PER_SECOND
+            self._knot(env, place, "walking", part, sign * mean_m_s, since_us)
+            since_us += part.duration_us
         yield env.timeout(duration_us)
+
+    def _phases(self, leg: Leg, limit_m_s: float) -> list[Phase]:
+        pace_m_s, rate_m_s2 = self.itinerary.speed_m_s, self.itinerary.acceleration_m_s2
+        if rate_m_s2 is None:
+            return steady(leg.length_m, pace_m_s)
+        found, self.speed_m_s = phases(self.speed_m_s, pace_m_s, limit_m_s, leg.length_m, rate_m_s2)
+        return found
 
     def _knot(
         self,
         env: simpy.Environment,
         place: GraphPosition,
         state: str,
-        speed_m_s: float = 0.0,
-        sign: float = 0.0,
+        part: Phase | None = None,
+        edge_speed_m_s: float = 0.0,
+        since_us: int = 0,
     ) -> None:
         x_m, y_m = self.graph.xy_m([place.edge], [place.offset_m])[0]
         self.log.knots.append(
             (
-                env.now,
+                env.now + since_us,
                 x_m,
                 y_m,
                 self._level(place.edge),
                 self.heading_rad,
-                speed_m_s,
-                0.0,
+                0.0 if part is None else part.speed_m_s,
+                0.0 if part is None else part.acceleration_m_s2,
                 place.edge,
                 place.offset_m,
-                sign * speed_m_s,
+                edge_speed_m_s,
                 _STATE[state],
             )
         )
+
+    def _go_to(self, edge: int) -> None:
+        self.present[self.here] -= 1
+        self.present[edge] += 1
+        self.here = edge
 
     def _press(self, env: simpy.Environment, place: GraphPosition) -> None:
         """Mark the start of the route, if it is a way point."""
@@ -147,8 +206,50 @@ class Walker:
         x, y = self.graph.direction[leg.edge] * (1.0 if leg.end_m > leg.start_m else -1.0)
         return float(np.arctan2(y, x))
 
+    @staticmethod
+    def _angle_rad(old_rad: float, new_rad: float) -> float:
+        return abs(float(wrap_angle(new_rad - old_rad)))
+
     def _level(self, edge: int) -> int:
         return int(self.graph.level[edge])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Tour:
+    """Scripted walks on a clock that others may share."""
+
+    walkers: tuple[Walker, ...]
+    processes: tuple[simpy.Process, ...]
+
+    @classmethod
+    def start(
+        cls,
+        env: simpy.Environment,
+        graph: AisleGraph,
+        itineraries: tuple[Itinerary, ...],
+        present: list[int],
+    ) -> Self:
+        """Walkers who wait for their time to come; `present` as in `Walker`."""
+        walkers = tuple(
+            Walker(graph=graph, itinerary=itinerary, present=present) for itinerary in itineraries
+        )
+        return cls(
+            walkers=walkers,
+            processes=tuple(env.process(walker.walk(env)) for walker in walkers),
+        )
+
+    def logs(self) -> tuple[WalkLog, ...]:
+        """Logs in the order of the itineraries, once all have arrived.
+
+        Raises
+        ------
+        InvariantError
+            If a walker did not arrive.
+        """
+        for walker, process in zip(self.walkers, self.processes, strict=True):
+            if not process.processed:
+                raise InvariantError(f"walker '{walker.itinerary.walker}' never arrived")
+        return tuple(walker.log for walker in self.walkers)
 
 
 def simulate_walkers(graph: AisleGraph, itineraries: tuple[Itinerary, ...]) -> tuple[WalkLog, ...]:
@@ -174,10 +275,6 @@ def simulate_walkers(graph: AisleGraph, itineraries: tuple[Itinerary, ...]) -> t
         If a walker did not arrive.
     """
     env = simpy.Environment()
-    walkers = [Walker(graph=graph, itinerary=itinerary) for itinerary in itineraries]
-    processes = [env.process(walker.walk(env)) for walker in walkers]
+    tour = Tour.start(env, graph, itineraries, [0] * (len(graph.edges) + 1))
     env.run()
-    for walker, process in zip(walkers, processes, strict=True):
-        if not process.processed:
-            raise InvariantError(f"walker '{walker.itinerary.walker}' never arrived")
-    return tuple(walker.log for walker in walkers)
+    return tour.logs()

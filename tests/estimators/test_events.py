@@ -41,6 +41,7 @@ def test_events_of_a_walk_are_in_order_of_time_then_kind_then_row():
     kind, row = event_order(SEEN)
     times = {
         Event.IMU: SEEN.imu.time_us,
+        Event.HEADING: SEEN.headings.time_us,
         Event.STEP: SEEN.steps.time_us,
         Event.MARK: SEEN.marks.time_us,
         Event.READING: SEEN.readings.time_us,

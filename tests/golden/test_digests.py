@@ -26,7 +26,7 @@ COUNTS = {
     "one": {"rssi": 93, "imu": 0, "steps": 19, "marks": 6, "heading": 0, "pressure": 0},
     "two": {"rssi": 50, "imu": 0, "steps": 14, "marks": 4, "heading": 0, "pressure": 0},
 }
-DIGEST = "0b83acf95b2164c0a49ca5097b147ca3e5c899516c67e6fe7c8a59cbcf33416e"
+DIGEST = "393a8f30fa6fa1ee00309f9684369b487710eebf6b43c5547bf9c689f8ec7057"
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from blesim.tables import StepTruth
+from blesim.tables import StepTruth, Trajectory
 from blesim.venue.graph import AisleGraph, Edge, Node
 from blesim.walkers.gait import Gait, steps_of
 from blesim.walkers.itinerary import Itinerary, Stop
@@ -89,3 +89,46 @@ def test_other_walkers_step_otherwise():
     assert steps_of(trajectory, Gait(), 5, "w") == steps_of(trajectory, Gait(), 5, "w")
     assert steps_of(trajectory, Gait(), 5, "w") != steps_of(trajectory, Gait(), 5, "v")
     assert steps_of(trajectory, Gait(), 5, "w") != steps_of(trajectory, Gait(), 6, "w")
+
+
+def test_a_slowly_growing_speed_gives_the_steps_of_its_integral():
+    # v = 0.4 + 0.05 t for 20 s: phase (T - a ln((a + b v1) / (a + b v0)) / (b a')) / b.
+    a, b, rate, span = 0.29, 0.32, 0.05, 20.0
+    way = 0.4 * span + 0.5 * rate * span**2
+    trajectory = Trajectory(
+        time_us=np.array([0, 20_000_000]),
+        x_m=np.array([0.0, way]),
+        y_m=np.zeros(2),
+        level=np.zeros(2, int),
+        heading_rad=np.zeros(2),
+        speed_m_s=np.array([0.4, 0.0]),
+        acceleration_m_s2=np.array([rate, 0.0]),
+        edge=np.zeros(2, int),
+        offset_m=np.array([0.0, way]),
+        edge_speed_m_s=np.array([way / span, 0.0]),
+        state=np.array([1, 0]),
+    )
+    steps = steps_of(trajectory, Gait(interval_variation=0.0), 5, "w")
+    phase = (span - a * np.log((a + b * 1.4) / (a + b * 0.4)) / (b * rate)) / b
+    assert len(steps) == int(phase)
+    assert steps.length_m[1:].sum() == pytest.approx(
+        trajectory.at(steps.time_us[-1:]).x_m[0] - trajectory.at(steps.time_us[:1]).x_m[0],
+        abs=0.01,
+    )
+    # Each step is as long as its mean speed asks for.
+    speed = np.diff(trajectory.at(steps.time_us).x_m) / np.diff(steps.time_us) * 1e6
+    assert steps.length_m[1:] == pytest.approx(a + b * speed, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("speed_m_s", "strides_per_minute"),
+    # Self-selected stride frequencies, van Oeveren et al. 2017, doi:10.1371/journal.pone.0184273
+    [(2.4, 77), (2.6, 79), (2.9, 80)],
+)
+def test_runners_step_as_measured(speed_m_s, strides_per_minute):
+    trajectory = straight_walk(3000.0, speed_m_s)
+    steps = steps_of(trajectory, Gait(), 5, "w")
+    rate = len(steps) / 2 / (trajectory.time_us[-1] / 6e7)
+    assert rate == pytest.approx(strides_per_minute, rel=0.015)
+    interval = np.diff(steps.time_us)
+    assert interval.std() / interval.mean() == pytest.approx(0.03, abs=0.002)

@@ -179,3 +179,47 @@ def test_way_points_of_the_section_are_shelf_ends_and_junctions(section):
     points = way_points(section)
     # Nineteen shelf ends in each of three aisles, and two junctions each.
     assert len(points) == 3 * 19 + 3 * 2
+
+
+def test_story_of_a_walk_with_acceleration():
+    trajectory, marks = walked(
+        speed_m_s=2.0,
+        acceleration_m_s2=1.0,
+        turn_rate_rad_s=np.pi / 2,
+        way_points=at([2.0, 0.0], [10.0, 5.0]),
+    )
+    # 2 s for the first 2 m, 3 s for 6 m, 2 s to stop; a quarter turn; the same again.
+    assert (trajectory.time_us / 1e6).tolist() == [0, 2, 5, 7, 8, 10, 13, 15]
+    assert trajectory.state.tolist() == [1, 1, 1, 2, 1, 1, 1, 0]
+    assert trajectory.speed_m_s.tolist() == [0, 2, 2, 0, 0, 2, 2, 0]
+    assert trajectory.acceleration_m_s2.tolist() == [1, 0, -1, 0, 1, 0, -1, 0]
+    assert trajectory.x_m.tolist() == [0, 2, 8, 10, 10, 10, 10, 10]
+    middle = trajectory.at(np.array([1_000_000, 3_500_000, 6_000_000]))
+    assert middle.x_m == pytest.approx([0.5, 5.0, 9.5])
+    assert middle.offset_m == pytest.approx([0.5, 5.0, 9.5])
+    assert middle.speed_m_s == pytest.approx([1.0, 2.0, 1.0])
+    assert (marks.time_us / 1e6).tolist() == pytest.approx([2.0, 11.5])
+
+
+def test_who_accelerates_stops_for_pauses_and_goes_on_through_nodes():
+    line = AisleGraph(
+        nodes=tuple(Node(id=f"n{k}", x_m=2.0 * k, y_m=0) for k in range(6)),
+        edges=tuple(Edge(first=f"n{k}", second=f"n{k + 1}", branch="a") for k in range(5)),
+    )
+    route = tuple(
+        Stop(place=line.at_node(name), pause_s=pause)
+        for name, pause in (("n0", 0.0), ("n3", 4.0), ("n5", 0.0))
+    )
+    itinerary = Itinerary(walker="w", stops=route, speed_m_s=1.5, acceleration_m_s2=0.75)
+    trajectory = simulate_walkers(line, (itinerary,))[0].trajectory()
+    at_nodes = [trajectory.speed_m_s[trajectory.x_m == x].max() for x in (2.0, 4.0, 6.0, 8.0)]
+    assert at_nodes == pytest.approx([1.5, 1.5, 0.0, 1.5], abs=0.25)
+    assert at_nodes[2] == 0
+    way_m = np.diff(trajectory.x_m).sum()
+    assert way_m == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize("rate", [0.0, -1.0, float("nan"), 21.0])
+def test_impossible_accelerations_are_refused(rate):
+    with pytest.raises(UsageError, match="acceleration_m_s2"):
+        walked(acceleration_m_s2=rate)
