@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from blesim import columns
-from blesim.imu.step_events import StepSensor, read_steps
+from blesim.imu.step_events import STEP_SENSORS, StepSensor, read_steps
 from blesim.tables import Steps, StepTruth
 from blesim.units import wrap_angle
 
@@ -67,3 +68,72 @@ def test_no_reading_is_beyond_what_a_recording_holds():
 
 def test_no_steps_give_no_events():
     assert read_steps(StepTruth.empty(), StepSensor(), 3, "w") == Steps.empty()
+
+
+def _perfect(**settings) -> StepSensor:
+    return StepSensor(
+        length_scale_std=0,
+        length_std_m=0,
+        stretch_heading_std_deg=0,
+        step_heading_std_deg=0,
+        **settings,
+    )
+
+
+def test_steps_are_missed_as_often_as_configured():
+    truth = walked(1, 20_000)
+    read = read_steps(truth, _perfect(missed=0.05), 3, "w")
+    # Wrong once in a million runs.
+    low, high = binom.ppf([5e-7, 1 - 5e-7], 20_000, 0.95)
+    assert low <= len(read) <= high
+    assert np.all(np.isin(read.time_us, truth.time_us))
+
+
+def test_steps_are_told_late_and_in_order():
+    truth = walked(1, 10_000)
+    read = read_steps(truth, _perfect(delay_s=0.6, delay_std_s=0.1), 3, "w")
+    late_s = (read.time_us - truth.time_us) * 1e-6
+    # 10 000 delays: the mean is good to a millisecond, the spread to 0.7 per cent.
+    assert late_s.mean() == pytest.approx(0.6, abs=0.005)
+    assert late_s.std() == pytest.approx(0.1, rel=0.04)
+    assert late_s.min() >= 0.0
+
+
+def test_batches_come_at_regular_times():
+    read = read_steps(walked(1, 500), _perfect(batch_s=2.5), 3, "w")
+    assert len(read) == 500
+    assert np.all(read.time_us % 2_500_000 == 0)
+
+
+def test_what_is_told_after_the_walk_is_lost():
+    truth = walked(1, 100)
+    end_us = int(truth.time_us[-1])
+    read = read_steps(truth, _perfect(delay_s=2.0), 3, "w", until_us=end_us)
+    assert len(read) == 96
+    assert read.time_us[-1] <= end_us
+
+
+def test_in_a_trolley_no_step_is_felt(carried):
+    truth = walked(1, 100)
+    how = carried((0, "hand"), (30, "trolley"), (45, "hand"))
+    read = read_steps(truth, _perfect(), 3, "w", carrying=how)
+    rolling = (truth.time_us >= 30_000_000) & (truth.time_us < 45_000_000)
+    assert rolling.sum() == 25
+    assert np.array_equal(read.time_us, truth.time_us[~rolling])
+
+
+def test_handling_the_phone_looks_like_steps(carried):
+    truth = walked(1, 3000)
+    modes = [(1.5 * number, "hand" if number % 2 else "pocket") for number in range(1001)]
+    read = read_steps(truth, _perfect(extra_steps=0.5), 3, "w", carrying=carried(*modes))
+    # A binomial count of 1000 at one half: within five spreads of 16.
+    assert len(read) - len(truth) == pytest.approx(500, abs=80)
+    assert np.all(np.diff(read.time_us) >= 0)
+
+
+@pytest.mark.parametrize("name", sorted(STEP_SENSORS))
+def test_systems_tell_most_steps_within_what_they_promise(name, carried):
+    truth = walked(4, 500)
+    read = read_steps(truth, STEP_SENSORS[name], 3, "w", carrying=carried("hand"))
+    assert len(read) == pytest.approx(len(truth), rel=0.04)
+    assert np.all(np.diff(read.time_us) >= 0)
