@@ -6,21 +6,18 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import Self
 
-import numpy as np
-
 from blesim import __version__
+from blesim.cast import carriers_of, crowd_of, everybody_in
 from blesim.errors import InvariantError, UsageError
-from blesim.imu.step_events import read_steps
+from blesim.observe import Carrier, observed
 from blesim.radio.air import Air
 from blesim.radio.life import Lives, simulate_life
-from blesim.recording import Observations, Provenance, Recording, Truth, Walk, WalkKind, WalkTruth
+from blesim.recording import Crowd, Provenance, Recording, Truth, Walk, WalkTruth
 from blesim.rng import refuse_bad_seed
 from blesim.scenario.build import Stage, set_stage
-from blesim.scenario.model import Scenario, WalkPlan
+from blesim.scenario.model import Scenario
 from blesim.scenario.reading import ScenarioFile
-from blesim.tables import Marks, Steps, StepTruth, Trajectory
-from blesim.walkers.gait import steps_of
-from blesim.walkers.walker import WalkLog, simulate_walkers
+from blesim.walkers.shop_floor import Progress
 from blesim.workers import workers
 
 
@@ -35,9 +32,11 @@ class Simulation:
     seed : int
         Of all its random numbers.
     stage : Stage
-        Venue and itineraries.
-    logs : tuple of WalkLog
-        One a walk.
+        Venue and who was told to walk in it.
+    carriers : tuple of Carrier
+        Whose phones are recorded: walks, surveys, then shoppers.
+    crowd : Crowd
+        Everybody who was in the store; nobody without a trading day.
     until_us : int
         Just after the last walker has arrived. [us]
     lives : Lives
@@ -49,13 +48,14 @@ class Simulation:
     scenario: Scenario
     seed: int
     stage: Stage
-    logs: tuple[WalkLog, ...]
+    carriers: tuple[Carrier, ...]
+    crowd: Crowd
     until_us: int
     lives: Lives
     provenance: Provenance
 
     @classmethod
-    def run(cls, file: ScenarioFile, seed: int | None) -> Self:
+    def run(cls, file: ScenarioFile, seed: int | None, progress: Progress | None = None) -> Self:
         """Let everybody walk.
 
         Parameters
@@ -64,6 +64,8 @@ class Simulation:
             What to simulate.
         seed : int or None
             Overrides the scenario's.
+        progress : callable, optional
+            Told how far a trading day has come: people who have left, and people.
 
         Raises
         ------
@@ -77,13 +79,17 @@ class Simulation:
             raise UsageError(f"{file.path}: no seed; give --seed N, or 'seed: N' in the scenario")
         refuse_bad_seed(seed)
         stage = set_stage(file, seed)
-        logs = simulate_walkers(stage.graph, stage.itineraries)
-        until_us = 1 + max(int(log.knots[-1][0]) for log in logs)
+        day = everybody_in(stage, seed, progress)
+        carriers = carriers_of(file.scenario, stage, day, seed)
+        crowd = crowd_of(stage, day)
+        walked = [*(each.trajectory for each in carriers), *(p.trajectory for p in crowd.people)]
+        until_us = 1 + max(int(trajectory.time_us[-1]) for trajectory in walked)
         return cls(
             scenario=file.scenario,
             seed=seed,
             stage=stage,
-            logs=logs,
+            carriers=carriers,
+            crowd=crowd,
             until_us=until_us,
             lives=simulate_life(stage.built.beacons, file.scenario.beacon_events, until_us),
             provenance=Provenance(
@@ -97,8 +103,8 @@ class Simulation:
 
     def air(self) -> Air:
         """What all phones have in common."""
-        names = (plan.name for plan in self.scenario.walks)
-        crowd = dict(zip(names, (log.trajectory() for log in self.logs), strict=True))
+        crowd = {carrier.name: carrier.trajectory for carrier in self.carriers}
+        crowd |= {person.name: person.trajectory for person in self.crowd.people}
         return Air.over(
             self.stage.built,
             self.scenario.radio,
@@ -125,7 +131,7 @@ class Simulation:
         """
         if jobs < 1:
             raise UsageError(f"jobs {jobs}: at least one process is needed")
-        rows = range(len(self.logs))
+        rows = range(len(self.carriers))
         if jobs == 1 or len(rows) == 1:
             air = self.air()
             yield from (_observed(self, air, row) for row in rows)
@@ -146,6 +152,7 @@ class Simulation:
             venue=self.stage.built,
             walks=MappingProxyType(truth),
             beacon_events=self.lives.log,
+            crowd=self.crowd,
         )
 
 
@@ -175,57 +182,10 @@ def _observed_by_worker(row: int) -> tuple[Walk, WalkTruth]:
 
 
 def _observed(simulation: Simulation, air: Air, row: int) -> tuple[Walk, WalkTruth]:
-    """What the phone of one walk recorded, and the truth about it."""
-    plan, log, record = (
-        simulation.scenario.walks[row],
-        simulation.logs[row],
-        simulation.scenario.record,
+    return observed(
+        simulation.scenario,
+        simulation.stage.graph,
+        simulation.seed,
+        air,
+        simulation.carriers[row],
     )
-    phone = simulation.scenario.phones[plan.phone]
-    trajectory, marks = log.trajectory(), log.pressed()
-    heard = air.heard_by(phone, plan.name, trajectory, keep_packets=record.packets)
-    taken, read = StepTruth.empty(), Steps.empty()
-    if record.steps:
-        taken = steps_of(trajectory, plan.gait, simulation.seed, plan.name)
-        read = read_steps(taken, phone.step_sensor, simulation.seed, plan.name)
-    observations = Observations(readings=heard.readings, steps=read, marks=marks)
-    _check(plan, simulation.stage, trajectory, observations)
-    walk = Walk(
-        name=plan.name,
-        walker=plan.name,
-        phone=plan.phone,
-        carrying=plan.carrying,
-        kind=WalkKind.SURVEY if plan.kind == "survey" else WalkKind.WALK,
-        split=plan.split,
-        observations=observations,
-    )
-    return walk, WalkTruth(trajectory=trajectory, steps=taken, packets=heard.packets)
-
-
-def _check(
-    plan: WalkPlan, stage: Stage, trajectory: Trajectory, observations: Observations
-) -> None:
-    """Raise `InvariantError` if a walk broke a law that holds for every walk."""
-    for table in observations.tables():
-        time_us = table[table.STREAM.columns[0]]
-        if (
-            len(time_us)
-            and not trajectory.time_us[0] <= time_us[0] <= time_us[-1] <= trajectory.time_us[-1]
-        ):
-            raise InvariantError(f"walk '{plan.name}': {table.STREAM.group} outlasts the walk")
-    _check_marks(plan, trajectory, observations.marks)
-    _check_positions(plan, stage, trajectory)
-
-
-def _check_marks(plan: WalkPlan, trajectory: Trajectory, marks: Marks) -> None:
-    poses = trajectory.at(marks.time_us)
-    if np.any(np.hypot(poses.x_m - marks.x_m, poses.y_m - marks.y_m) > 0.01):
-        raise InvariantError(f"walk '{plan.name}': a way point was pressed somewhere else")
-
-
-def _check_positions(plan: WalkPlan, stage: Stage, trajectory: Trajectory) -> None:
-    """Knots lie on their edges; the edges were checked against shelves and walls before."""
-    on_edge_m = stage.graph.xy_m(trajectory.edge, trajectory.offset_m)
-    off_m = np.hypot(on_edge_m[:, 0] - trajectory.x_m, on_edge_m[:, 1] - trajectory.y_m)
-    if np.any(off_m > 1e-4):
-        raise InvariantError(f"walk '{plan.name}': a knot is not on the aisle it names")

@@ -30,6 +30,8 @@ ROOMS = (
     "radio",
     "imu",
     "scenario",
+    "observe",
+    "cast",
     "simulate",
     "dataset",
     "pdr",
@@ -43,7 +45,7 @@ ROOMS = (
     "report",
     "cli",
 )
-SIMULATOR = ("scenario", "simulate", "walkers", "radio", "imu")
+SIMULATOR = ("scenario", "observe", "cast", "simulate", "walkers", "radio", "imu")
 BLIND_TO_THE_SIMULATOR = ("dataset", "pdr", "ranging", "filters", "estimators", "metrics")
 FORBIDDEN = {("radio", "imu"), ("imu", "radio")} | {
     (room, other) for room in BLIND_TO_THE_SIMULATOR for other in SIMULATOR

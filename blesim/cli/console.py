@@ -4,8 +4,8 @@ import errno
 import json
 import os
 import sys
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from typing import Any, TypeVar
 
@@ -97,6 +97,56 @@ def progress(items: Iterable[T], total: int, what: str) -> Iterator[T]:
     for item in shown(items, total, what):
         yield item
         refuse_if_stopped()
+
+
+@contextmanager
+def day_progress() -> Iterator[Callable[[int, int], None]]:
+    """What to tell how far a simulated day has come: how many people are gone, and of how many.
+
+    A bar on a terminal and a line for each tenth elsewhere, on standard error. Raises `Stopped`
+    out of the day if somebody wished it.
+    """
+    told = _DayBar() if sys.stderr.isatty() else _DayLines()
+    try:
+        yield told.tell
+    finally:
+        told.end()
+
+
+class _DayLines:
+    """One line for each tenth of the people of a day."""
+
+    def __init__(self) -> None:
+        self._tenths = 0
+
+    def tell(self, gone: int, people: int) -> None:
+        refuse_if_stopped()
+        tenths = 10 * gone // max(people, 1)
+        if tenths > self._tenths:
+            self._tenths = tenths
+            say(f"day: {gone}/{people} people have left")
+
+    def end(self) -> None:
+        """Do nothing more."""
+
+
+class _DayBar:
+    """A bar that fills as a day goes by."""
+
+    def __init__(self) -> None:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        self._bar = Progress(console=Console(stderr=True), transient=True)
+        self._task = self._bar.add_task("trading day")
+        self._bar.start()
+
+    def tell(self, gone: int, people: int) -> None:
+        refuse_if_stopped()
+        self._bar.update(self._task, completed=gone, total=people)
+
+    def end(self) -> None:
+        self._bar.stop()
 
 
 def _lines(items: Iterable[T], total: int, what: str) -> Iterator[T]:

@@ -1,4 +1,4 @@
-"""`blesim fidelity`: the scorecard of the simulated radio against a recorded one."""
+"""`blesim fidelity`: the scorecard of a simulated recording against a real one."""
 
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +10,11 @@ from blesim.cli.console import answer, answer_json, answer_table, say
 
 def fidelity(
     dataset: Annotated[
-        str, typer.Argument(metavar="DATASET", help="philotuxo, mitll_static or uji_library.")
+        str,
+        typer.Argument(
+            metavar="DATASET",
+            help="philotuxo, mitll_static or uji_library (radio); oxford_steps or ilc20 (sensors).",
+        ),
     ],
     source: Annotated[Path, typer.Argument(metavar="PATH", help="Folder of the data set.")],
     scenario: Annotated[
@@ -35,7 +39,7 @@ def fidelity(
     comparison = DATASETS[dataset](source, radio, seed)
     if plot is not None:
         from blesim.report.fidelity_figure import draw_comparison
-        from blesim.report.track_figure import save
+        from blesim.report.figure_file import save
 
         save(draw_comparison(comparison), plot)
         say(f"{plot}: {len(comparison.panels)} panels")

@@ -76,7 +76,7 @@ def _to_draw(recording: "Recording", plot: Path, walk_name: str | None) -> str:
     """Name of the walk to draw; what cannot be drawn is refused before the work."""
     from blesim.errors import DataError, UsageError
     from blesim.metrics.score import scored_walks
-    from blesim.report.track_figure import refuse_unknown_format
+    from blesim.report.figure_file import refuse_unknown_format
 
     refuse_unknown_format(plot)
     names = [walk.name for walk in scored_walks(recording)]
@@ -90,7 +90,8 @@ def _to_draw(recording: "Recording", plot: Path, walk_name: str | None) -> str:
 def _draw(recording: "Recording", truth: "Truth", runs: "Tracks", name: str, plot: Path) -> None:
     from blesim.metrics.position_error import pooled
     from blesim.metrics.score import scored_walks, track_errors
-    from blesim.report.track_figure import draw_tracks, save
+    from blesim.report.figure_file import save
+    from blesim.report.track_figure import draw_tracks
     from blesim.tables import Track
 
     labels = dict.fromkeys(label for label, _ in runs)

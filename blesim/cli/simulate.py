@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from blesim.cli.console import progress, say
+from blesim.cli.console import day_progress, progress, say
 from blesim.cli.output import output_path
 
 if TYPE_CHECKING:
@@ -34,7 +34,8 @@ def simulate(
     from blesim.scenario.reading import read_scenario
     from blesim.simulate import Simulation
 
-    simulation = Simulation.run(read_scenario(scenario), seed)
+    with day_progress() as told:
+        simulation = Simulation.run(read_scenario(scenario), seed, told)
     target = output_path(output, f"{scenario.stem}.h5")
     heard, silent = 0, {beacon.id for beacon in simulation.stage.surveyed.beacons}
     file = RecordingWriter(
@@ -43,9 +44,10 @@ def simulate(
         venue_built=simulation.stage.built,
         provenance=simulation.provenance,
         beacon_events=simulation.lives.log,
+        crowd=simulation.crowd,
     )
     with closing(simulation.walks(jobs)) as walks, file as writer:
-        for walk, truth in progress(walks, len(simulation.logs), "walk"):
+        for walk, truth in progress(walks, len(simulation.carriers), "walk"):
             writer.append(walk, truth)
             heard += len(walk.observations.readings)
             silent -= _beacons_heard(walk, simulation.stage.surveyed)
@@ -53,7 +55,7 @@ def simulate(
                 say(f"walk '{walk.name}' heard no beacon at all")
     if silent:
         say(f"nobody heard {len(silent)} of the beacons: {', '.join(sorted(silent))}")
-    say(f"{target}: {len(simulation.logs)} walks, {heard} readings, seed {simulation.seed}")
+    say(f"{target}: {len(simulation.carriers)} walks, {heard} readings, seed {simulation.seed}")
 
 
 def _beacons_heard(walk: "Walk", venue: "Venue") -> set[str]:

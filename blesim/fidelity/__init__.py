@@ -1,1 +1,1 @@
-"""Does the simulated radio look like the recorded one: statistics beside those of a twin."""
+"""Does the simulation look like the recording: statistics beside those of a twin."""

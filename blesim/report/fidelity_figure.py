@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from blesim.fidelity.comparison import Comparison, Panel
 from blesim.fidelity.scorecard import inside_count
-from blesim.report.track_figure import COLOURS
+from blesim.report.colours import COLOURS
 
 _COLUMNS = 3
 _REAL, _SIMULATED = "#222222", COLOURS[1]

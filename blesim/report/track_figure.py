@@ -1,33 +1,21 @@
 """The picture of a scored recording: tracks over the floor plan, error distributions beside it."""
 
-import warnings
 from collections.abc import Mapping
-from io import BytesIO
-from pathlib import Path
-from typing import Any
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backend_bases import FigureCanvasBase
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
-from shapely import get_coordinates
 
-from blesim.errors import UsageError
+from blesim.report.colours import COLOURS, SHELF, TRUTH
 from blesim.report.printable import printable
+from blesim.report.venue_drawing import draw_beacons, draw_level
 from blesim.tables import Track, Trajectory
 from blesim.venue.venue import Venue
-from blesim.whole_file import write_whole
 
-# Told apart by people with any colour vision: Okabe and Ito, "Color universal design", 2008.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-_SHELF = "#c9c4bb"
-_FLOOR = "#f7f5f1"
-_TRUTH = "#222222"
 _ERROR_SHARE = 0.99
 
 
@@ -61,86 +49,23 @@ def draw_tracks(
     map_width = float(np.clip(4.6 * (east - west) / (north - south), 5.0, 11.0))
     figure = Figure(figsize=(map_width + 4.6, 5.2), layout="constrained")
     plan, distribution = figure.subplots(1, 2, width_ratios=(map_width, 4.4))
-    _draw_venue(plan, venue)
+    draw_level(plan, venue, venue.floor_plan.levels[0])
+    draw_beacons(plan, venue)
     _draw_walk(plan, trajectory, tracks, shelves=bool(venue.floor_plan.obstacles))
     plan.set_title(printable(f"{venue.name}: {walk}"), loc="left", parse_math=False)
     _draw_errors(distribution, errors_m)
     return figure
 
 
-def refuse_unknown_format(path: Path) -> None:
-    """Raise `UsageError` if a name ends in no format that can be drawn."""
-    if _kind(path) not in FigureCanvasBase.get_supported_filetypes():
-        raise UsageError(
-            f"{path}: a figure cannot be written as '{_kind(path)}'; use .png, .svg or .pdf"
-        )
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure, whole or not at all; the same figure gives the same bytes.
-
-    Raises
-    ------
-    UsageError
-        If the name ends in no format that can be drawn, or nothing can be written there.
-    DataError
-        If the disk is full or fails.
-    """
-    refuse_unknown_format(path)
-    kind, drawn = _kind(path), BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "blesim"}), warnings.catch_warnings():
-        # A letter that the font lacks is drawn as a box; nobody needs to be told of each.
-        warnings.filterwarnings("ignore", message=r"Glyph .* missing from")
-        figure.savefig(drawn, format=kind, dpi=120, metadata=_no_date(kind))
-    write_whole(path, drawn.getvalue())
-
-
-def _kind(path: Path) -> str:
-    return path.suffix.removeprefix(".").lower()
-
-
-def _no_date(kind: str) -> dict[str, Any]:
-    dated = {"svg": "Date", "pdf": "CreationDate"}
-    return {dated[kind]: None} if kind in dated else {}
-
-
-def _draw_venue(axes: Axes, venue: Venue) -> None:
-    level = venue.floor_plan.levels[0]
-    axes.fill(
-        *get_coordinates(level.bounds).T, facecolor=_FLOOR, edgecolor="#999999", linewidth=0.8
-    )
-    for obstacle in venue.floor_plan.obstacles:
-        if obstacle.level == level.level:
-            axes.fill(*get_coordinates(obstacle.outline.exterior).T, facecolor=_SHELF)
-    x_m, y_m, _ = venue.beacon_xyz_m.T
-    axes.scatter(x_m, y_m, s=22, marker="^", color=COLOURS[2], zorder=4, linewidths=0)
-    if len(venue.beacons) <= 40:
-        for beacon in venue.beacons:
-            axes.annotate(
-                printable(beacon.id),
-                (beacon.x_m, beacon.y_m),
-                xytext=(0, 4),
-                textcoords="offset points",
-                ha="center",
-                fontsize=6.5,
-                color="#444444",
-                parse_math=False,
-            )
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
-    axes.spines[["top", "right"]].set_visible(False)
-
-
 def _draw_walk(
     axes: Axes, trajectory: Trajectory, tracks: Mapping[str, Track], *, shelves: bool
 ) -> None:
-    axes.plot(trajectory.x_m, trajectory.y_m, color=_TRUTH, linewidth=2.2, zorder=3)
-    axes.plot(trajectory.x_m[0], trajectory.y_m[0], "o", color=_TRUTH, markersize=7, zorder=6)
+    axes.plot(trajectory.x_m, trajectory.y_m, color=TRUTH, linewidth=2.2, zorder=3)
+    axes.plot(trajectory.x_m[0], trajectory.y_m[0], "o", color=TRUTH, markersize=7, zorder=6)
     labels = [
-        *([Patch(facecolor=_SHELF, label="shelf")] if shelves else []),
+        *([Patch(facecolor=SHELF, label="shelf")] if shelves else []),
         *axes.plot([], [], "^", color=COLOURS[2], linestyle="none", label="beacon"),
-        *axes.plot([], [], "o-", color=_TRUTH, linewidth=2.2, label="true track, dot at the start"),
+        *axes.plot([], [], "o-", color=TRUTH, linewidth=2.2, label="true track, dot at the start"),
     ]
     for colour, (label, track) in zip(_cycle(len(tracks)), tracks.items(), strict=True):
         poses = trajectory.at(track.time_us)

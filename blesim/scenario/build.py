@@ -1,29 +1,34 @@
-"""From what a scenario says to what walks: venues, itineraries, and whether it all connects."""
+"""From what a scenario says to what happens: who walks and surveys, and whether it connects."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
-from shapely.ops import nearest_points
 
 from blesim.errors import BlesimError, ScenarioError, VenueError
 from blesim.radio.beacon_events import Moves, impossible_events, in_order
 from blesim.recording import ALL_WALKS
-from blesim.rng import Draws
-from blesim.scenario.model import RouteStop, VenueSource, WalkPlan
 from blesim.scenario.reading import ScenarioFile
-from blesim.venue.beacons import Beacon
-from blesim.venue.geojson import from_geojson
+from blesim.scenario.survey_plan import SurveyPlan
+from blesim.scenario.venue_built import built_venue, surveyed_venue
+from blesim.scenario.walk_plan import RouteStop, WalkPlan
+from blesim.units import wrap_angle
 from blesim.venue.graph import AisleGraph, GraphPosition, Leg
-from blesim.venue.layouts import wholesale_section, wholesale_store
 from blesim.venue.venue import Venue
+from blesim.walkers.faults import faults as day_faults
 from blesim.walkers.itinerary import Itinerary, Stop, WayPoints, way_points
+from blesim.walkers.shopping import read_lists, read_routes
+from blesim.walkers.survey import SpotSurvey, grid_spots_m
+from blesim.walkers.trading_day import TradingDay
 
-_LAYOUTS = {"wholesale-section": wholesale_section, "wholesale-store": wholesale_store}
 _OFF_AISLE_M = 0.5
 _LATEST_END_S = 31 * 86400.0
+# What simulated people are called.
+_TAKEN = ("shopper-", "replayed-", "staff-")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -32,12 +37,14 @@ class Stage:
 
     built: Venue
     surveyed: Venue
-    graph: AisleGraph
+    graph: AisleGraph | None
     itineraries: tuple[Itinerary, ...]
+    surveys: tuple[SpotSurvey, ...] = field(default=())
+    day: TradingDay | None = None
 
 
 def set_stage(file: ScenarioFile, seed: int) -> Stage:
-    """The venue and the itineraries of a scenario.
+    """The venue and who walks in it.
 
     Parameters
     ----------
@@ -56,90 +63,125 @@ def set_stage(file: ScenarioFile, seed: int) -> Stage:
         With a line for every fault: a wrong map, an unknown phone or node, a route that does not
         connect.
     """
-    built = _built(file)
+    built, scenario = built_venue(file), file.scenario
     graph = built.graph
-    if graph is None:
+    if graph is None and (scenario.walks or scenario.trading_day is not None):
         raise ScenarioError(file.fault(["venue"], "the map has no aisle graph to walk on"))
     faults = [*_name_faults(file), *_phone_faults(file), *_event_faults(file, built)]
-    itineraries = []
-    for row, plan in enumerate(file.scenario.walks):
-        stops, walk_faults = _stops(file, row, plan, graph)
-        faults += walk_faults or _way_faults(file, row, stops, graph)
-        if not faults:
-            itineraries.append(_itinerary(plan, stops, built))
+    surveys, day = [], _day(file, built, faults)
+    itineraries: list[Itinerary] = []
+    if graph is not None:
+        itineraries = _itineraries(file, built, graph, faults)
+    for row, survey in enumerate(scenario.surveys):
+        surveys.append(_survey(survey, built))
+        faults += [file.fault(["surveys", row], each) for each in _spot_faults(survey, built)]
     if faults:
         raise ScenarioError("\n".join(faults))
     return Stage(
         built=built,
-        surveyed=_surveyed(built, file.scenario.venue, seed),
+        surveyed=surveyed_venue(built, scenario.venue, seed),
         graph=graph,
         itineraries=tuple(itineraries),
+        surveys=tuple(surveys),
+        day=day,
     )
 
 
-def _built(file: ScenarioFile) -> Venue:
-    source = file.scenario.venue
-    if source.layout is not None:
-        return _LAYOUTS[source.layout]()
-    map_path = file.path.parent / str(source.map)
-    try:
-        return from_geojson(map_path.read_text(encoding="utf-8-sig"), str(map_path))
-    except OSError as error:
-        reason = f"{map_path}: {error.strerror}"
-    except UnicodeDecodeError as error:
-        reason = f"{map_path}: not UTF-8 text at byte {error.start}"
-    except BlesimError as error:
-        reason = str(error)
-    raise ScenarioError(
-        "\n".join(file.fault(["venue", "map"], line) for line in reason.split("\n"))
+def _itineraries(
+    file: ScenarioFile, built: Venue, graph: AisleGraph, faults: list[str]
+) -> list[Itinerary]:
+    """Who was told to walk where; adds what is wrong with it to `faults`."""
+    itineraries = []
+    for row, plan in enumerate(file.scenario.walks):
+        stops, walk_faults = _stops(file, row, plan, graph)
+        walk_faults = walk_faults or _way_faults(file, row, stops, graph)
+        if not walk_faults:
+            itineraries.append(_itinerary(plan, stops, built))
+        faults += walk_faults
+    return itineraries
+
+
+def _day(file: ScenarioFile, built: Venue, faults: list[str]) -> TradingDay | None:
+    """The trading day with the content of its files; adds what is wrong with it to `faults`."""
+    told = file.scenario.trading_day
+    if told is None:
+        return None
+    content: dict[str, Any] = {}
+    for key, name, read in (
+        ("lists", told.lists_file, read_lists),
+        ("routes", told.routes_file, read_routes),
+    ):
+        if name is None:
+            continue
+        try:
+            content[key] = (*getattr(told, key), *read(Path(file.path.parent, name)))
+        except BlesimError as error:
+            faults.append(file.fault(["trading_day", f"{key}_file"], str(error)))
+    day = told.model_copy(update=content)
+    found = day_faults(day, built) if built.graph is not None else []
+    faults += [file.fault(["trading_day", *location], message) for location, message in found]
+    return day
+
+
+def _survey(plan: SurveyPlan, built: Venue) -> SpotSurvey:
+    spots_m = np.array([(spot.x_m, spot.y_m) for spot in plan.spots]).reshape(-1, 2)
+    if plan.grid_m is not None and plan.level in built.floor_plan.walkable:
+        spots_m = grid_spots_m(built.floor_plan, plan.level, plan.grid_m)
+    return SpotSurvey(
+        spots_m=spots_m,
+        level=plan.level,
+        headings_rad=tuple(float(wrap_angle(np.radians(deg))) for deg in plan.directions_deg),
+        stand_s=plan.stand_s,
+        speed_m_s=plan.speed_m_s,
+        turn_rate_rad_s=float(np.radians(plan.turn_rate_deg_s)),
+        start_s=plan.start_s,
     )
 
 
-def _surveyed(built: Venue, source: VenueSource, seed: int) -> Venue:
-    """The venue as the installer knows it: beacons where believed to be, gains unknown."""
-    return built.with_beacons(
-        tuple(_written_down(beacon, built, source.survey_error_m, seed) for beacon in built.beacons)
-    )
-
-
-def _written_down(beacon: Beacon, built: Venue, error_m: float, seed: int) -> Beacon:
-    """The beacon as the installer knows it: without what only its hardware knows."""
-    unknown = {"channel_gain_db": Beacon.model_fields["channel_gain_db"].default}
-    place = _believed_place(beacon, built, error_m, seed) if error_m > 0 else {}
-    return beacon.model_copy(update=unknown | place)
-
-
-def _believed_place(beacon: Beacon, built: Venue, error_m: float, seed: int) -> dict[str, float]:
-    """Where the installer believes the beacon to be: off, but never inside a shelf or wall."""
-    free = built.floor_plan.walkable[beacon.level]
-    if free.is_empty:
-        return {}
-    draws = Draws(seed=seed, purpose="survey error", beacon=beacon.id)
-    east_m, north_m = error_m * draws.normals(np.zeros(1, int))[0, :2]
-    believed = shapely.Point(beacon.x_m + east_m, beacon.y_m + north_m)
-    nearest, _ = nearest_points(free, believed)
-    return {"x_m": round(nearest.x, 6), "y_m": round(nearest.y, 6)}
+def _spot_faults(plan: SurveyPlan, built: Venue) -> Iterator[str]:
+    free = built.floor_plan.walkable.get(plan.level)
+    if free is None:
+        yield f"the map has no level {plan.level}"
+        return
+    if plan.grid_m is not None and not len(grid_spots_m(built.floor_plan, plan.level, plan.grid_m)):
+        yield f"no crossing of a grid of {plan.grid_m:g} m is walkable; make it narrower"
+    for spot in plan.spots:
+        if not shapely.covers(free, shapely.Point(spot.x_m, spot.y_m)):
+            yield f"({spot.x_m:g}, {spot.y_m:g}) is not walkable: inside a shelf, or out of bounds"
 
 
 def _name_faults(file: ScenarioFile) -> list[str]:
     seen: set[str] = set()
     faults = []
-    for row, plan in enumerate(file.scenario.walks):
+    for where, plan in _plans(file):
         if plan.name in seen:
             message = f"walk '{plan.name}' is there twice; give each its own name"
-            faults.append(file.fault(["walks", row, "name"], message))
+            faults.append(file.fault([*where, "name"], message))
         if plan.name == ALL_WALKS:
             message = f"'{ALL_WALKS}' stands for all walks in error tables; give another name"
-            faults.append(file.fault(["walks", row, "name"], message))
+            faults.append(file.fault([*where, "name"], message))
+        if file.scenario.trading_day is not None and plan.name.startswith(_TAKEN):
+            message = f"'{plan.name}' may be a simulated person's name; give another"
+            faults.append(file.fault([*where, "name"], message))
         seen.add(plan.name)
     return faults
 
 
+def _plans(file: ScenarioFile) -> list[tuple[tuple[str, int], WalkPlan | SurveyPlan]]:
+    """Walks and surveys, each with where it stands in the scenario."""
+    walks, surveys = file.scenario.walks, file.scenario.surveys
+    return [
+        *((("walks", row), walk) for row, walk in enumerate(walks)),
+        *((("surveys", row), survey) for row, survey in enumerate(surveys)),
+    ]
+
+
 def _phone_faults(file: ScenarioFile) -> list[str]:
     known = ", ".join(file.scenario.phones)
+    shoppers = ((("shopper_phones", n), e) for n, e in enumerate(file.scenario.shopper_phones))
     return [
-        file.fault(["walks", row, "phone"], f"unknown phone '{plan.phone}'; there is {known}")
-        for row, plan in enumerate(file.scenario.walks)
+        file.fault([*where, "phone"], f"unknown phone '{plan.phone}'; there is {known}")
+        for where, plan in (*_plans(file), *shoppers)
         if plan.phone not in file.scenario.phones
     ]
 

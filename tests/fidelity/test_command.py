@@ -47,10 +47,16 @@ def test_the_radio_section_of_a_scenario_takes_the_place_of_the_preset(data_dir,
 @pytest.mark.parametrize(
     ("arguments", "code", "told"),
     [
-        (("moon", "."), 2, "unknown data set 'moon'; known are mitll_static, philotuxo"),
+        (
+            ("moon", "."),
+            2,
+            "unknown data set 'moon'; known are ilc20, mitll_static, oxford_steps, philo",
+        ),
         (("philotuxo", "nowhere"), 1, "nowhere/cnf/tetam.dev: cannot be read"),
         (("mitll_static", "nowhere"), 1, "Chamber.csv.gz: not there"),
         (("uji_library", "nowhere"), 1, "lib_ids.csv: cannot be read"),
+        (("oxford_steps", "nowhere"), 1, "nowhere/index.csv: not there"),
+        (("ilc20", "nowhere"), 1, "nowhere/site1_B1: too few traces there"),
         (("uji_library", ".", "--seed", "-1"), 2, "seed -1"),
     ],
 )
@@ -73,3 +79,15 @@ def test_a_twin_that_hears_nothing_is_told_in_one_line(dataset, data_dir, tmp_pa
     ended = fidelity(dataset, data_dir(dataset), "--scenario", scenario, expect=2)
     assert "too few to compare" in ended.stderr
     assert len(ended.stderr.splitlines()) == 1
+
+
+def test_sensors_have_no_radio_section(tmp_path):
+    scenario = tmp_path / "any.yaml"
+    scenario.write_text(
+        "title: any\n"
+        "venue: {layout: wholesale-section}\n"
+        "phones: {a: {}}\n"
+        "walks: [{name: w, phone: a, route: [E1, E2]}]\n"
+    )
+    ended = fidelity("oxford_steps", tmp_path, "--scenario", scenario, expect=2)
+    assert ended.stderr == "blesim: oxford_steps compares no radio; leave the scenario out\n"

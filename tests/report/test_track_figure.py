@@ -4,9 +4,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from blesim.errors import UsageError
 from blesim.estimators.base import make_track
-from blesim.report.track_figure import draw_tracks, save
+from blesim.report.figure_file import save
+from blesim.report.track_figure import draw_tracks
 from blesim.tables import Trajectory
 
 WEIRD = "$\\foo{$ \x1b[31m\n<&> 店"
@@ -37,18 +37,3 @@ def test_any_name_can_be_drawn(section, tmp_path, ending):
     save(drawn(section, WEIRD), path)
     if ending == "svg":
         ElementTree.parse(path)
-
-
-@pytest.mark.parametrize("ending", ["PNG", "Svg", "pDf"])
-def test_the_case_of_the_ending_does_not_matter_and_the_bytes_repeat(section, tmp_path, ending):
-    paths = [tmp_path / f"{name}.{ending}" for name in "ab"]
-    for path in paths:
-        save(drawn(section, "run"), path)
-    assert paths[0].read_bytes() == paths[1].read_bytes()
-    assert sorted(tmp_path.iterdir()) == paths
-
-
-def test_an_unknown_ending_is_refused(section, tmp_path):
-    with pytest.raises(UsageError, match=r"a\.xyz: a figure cannot be written as 'xyz'"):
-        save(drawn(section, "run"), tmp_path / "a.xyz")
-    assert list(tmp_path.iterdir()) == []

@@ -10,7 +10,7 @@ from blesim.errors import InvariantError, UsageError
 from blesim.recording import WalkKind
 from blesim.scenario.reading import read_scenario
 from blesim.simulate import Simulation
-from blesim.walkers.walker import WalkLog
+from blesim.tables import Marks
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
 
@@ -108,9 +108,10 @@ def test_a_broken_walk_is_a_fault_of_the_program(tmp_path):
     path = tmp_path / "scenario.yaml"
     path.write_text(SMALL, encoding="utf-8")
     simulation = Simulation.run(read_scenario(path), 1)
-    log = simulation.logs[0]
-    shifted = WalkLog(knots=log.knots, marks=[(t, x + 1, y, level) for t, x, y, level in log.marks])
-    broken = dataclasses.replace(simulation, logs=(shifted, simulation.logs[1]))
+    first, *others = simulation.carriers
+    pressed = {column.field: first.marks[column] for column in first.marks.STREAM.columns}
+    shifted = dataclasses.replace(first, marks=Marks(**pressed | {"x_m": first.marks.x_m + 1}))
+    broken = dataclasses.replace(simulation, carriers=(shifted, *others))
     with pytest.raises(InvariantError, match="way point was pressed somewhere else"):
         broken.recording()
 
