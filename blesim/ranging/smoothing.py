@@ -81,6 +81,24 @@ class SignalWindow:
         self._advance(readings, signals, np.empty(0, np.int64))
         return signals
 
+    def at(self, now_us: int) -> NDArray[np.float64]:
+        """Signal value of every beacon at a moment after the blocks so far, (beacons,).
+
+        NaN for a beacon without a reading in the window. [dBm]
+
+        Raises
+        ------
+        DataError
+            If the moment lies before the end of the last block.
+        """
+        if len(self._time_us) and now_us < self._time_us[-1]:
+            raise DataError(f"{now_us} us lies before the last reading; ask in order of time")
+        first = int(np.searchsorted(self._time_us, now_us - self._window_us, side="right"))
+        value = np.empty(self._beacons)
+        beacon, rssi_dbm = self._beacon[first:], self._rssi_dbm[first:]
+        _fill_value(beacon, rssi_dbm, self._averaged, self._rate, value)
+        return value
+
     def strongest(self, readings: Readings) -> NDArray[np.int64]:
         """Beacon with the highest signal value after each reading of the next block.
 
@@ -164,20 +182,32 @@ def _fill(
     for row in range(kept, len(time_us)):
         while time_us[first] <= time_us[row] - window_us:
             first += 1
-        value[:] = np.nan
-        for i in range(first, row + 1):
-            b, reading = beacon[i], float(rssi_dbm[i])
-            if np.isnan(value[b]):
-                value[b] = reading
-            elif averaged:
-                value[b] = rate * reading + (1.0 - rate) * value[b]
-            else:
-                value[b] = max(value[b], reading)
+        _fill_value(beacon[first : row + 1], rssi_dbm[first : row + 1], averaged, rate, value)
         if len(signals):
             signals[row - kept] = value
         if len(strongest):
             strongest[row - kept] = _latest_of_strongest(beacon, first, row, value)
     return first
+
+
+@kernel
+def _fill_value(
+    beacon: NDArray[Any],
+    rssi_dbm: NDArray[Any],
+    averaged: bool,
+    rate: float,
+    value: NDArray[np.float64],
+) -> None:
+    """Fill the signal values (beacons,) of the readings of a window, oldest first (kernel)."""
+    value[:] = np.nan
+    for i in range(len(beacon)):
+        b, reading = beacon[i], float(rssi_dbm[i])
+        if np.isnan(value[b]):
+            value[b] = reading
+        elif averaged:
+            value[b] = rate * reading + (1.0 - rate) * value[b]
+        else:
+            value[b] = max(value[b], reading)
 
 
 @kernel

@@ -1,0 +1,1 @@
+"""Kalman and particle machinery: building blocks of estimators."""
