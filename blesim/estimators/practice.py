@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from blesim.recording import Observations, Provenance, Recording, Walk, WalkKind
 from blesim.rng import Draws
-from blesim.tables import Imu, Marks, Readings, Steps
+from blesim.tables import Headings, Imu, Marks, Readings, Steps
 from blesim.venue.beacons import Beacon
 from blesim.venue.floor_plan import FloorPlan, Level
 from blesim.venue.graph import AisleGraph, Edge, Node
@@ -19,7 +19,11 @@ _SPEED_M_S = 1.0
 _STEP_US = 600_000
 _READING_US = 100_000
 _IMU_US = 40_000
+_HEADING_US = 200_000
 _GRAVITY_M_S2 = 9.81
+_BOUNCE_M_S2 = 3.0
+# Samples over which a corner is turned.
+_TURN_SAMPLES = 20
 _MEASURED_POWER_DBM = -61.0
 _HEIGHT_DIFFERENCE_M = 1.0
 
@@ -31,8 +35,9 @@ _AISLES = (("a", "b", "aisle 1"), ("b", "c", "east"), ("c", "d", "aisle 2"), ("d
 def practice_recording(seed: int = 1) -> Recording:
     """Recording of two aisles with eight beacons: a survey walk and two walks, 32 s each.
 
-    It holds every stream: readings with their channels, IMU samples of a phone held flat and still,
-    step events and marks. Some events fall on the same microsecond, as they do on phones.
+    It holds readings with their channels, IMU samples of a phone held flat that show steps and
+    turns, step events, headings and marks. Some events fall on the same microsecond, as they do on
+    phones.
 
     Parameters
     ----------
@@ -92,8 +97,9 @@ def _walk(
     passed_us = np.round(np.append(0.0, np.cumsum(legs_m)) / _SPEED_M_S * 1e6).astype(np.int64)
     observations = Observations(
         readings=_readings(venue, name, passed_us, way_points_m, seed),
-        imu=_imu(int(passed_us[-1])),
+        imu=_imu(passed_us, way_points_m),
         steps=_steps(passed_us, way_points_m),
+        headings=_headings(passed_us, way_points_m),
         marks=Marks(
             time_us=passed_us,
             x_m=way_points_m[:, 0],
@@ -136,28 +142,50 @@ def _readings(
 
 def _steps(passed_us: NDArray[np.int64], way_points_m: NDArray[np.float64]) -> Steps:
     time_us = np.arange(_STEP_US, int(passed_us[-1]) + 1, _STEP_US)
-    leg = np.minimum(np.searchsorted(passed_us, time_us, side="right") - 1, len(passed_us) - 2)
-    along = np.diff(way_points_m, axis=0)[leg]
     return Steps(
         time_us=time_us,
         length_m=np.full(len(time_us), _SPEED_M_S * _STEP_US * 1e-6),
-        heading_rad=np.arctan2(along[:, 1], along[:, 0]),
+        heading_rad=_heading_rad(time_us, passed_us, way_points_m),
     )
 
 
-def _imu(end_us: int) -> Imu:
-    """Samples of a phone that lies flat and still, its y axis to the north of the map."""
-    time_us = np.arange(0, end_us + 1, _IMU_US)
-    still = np.zeros(len(time_us))
+def _headings(passed_us: NDArray[np.int64], way_points_m: NDArray[np.float64]) -> Headings:
+    time_us = np.arange(0, int(passed_us[-1]) + 1, _HEADING_US)
+    heading_rad = _heading_rad(time_us, passed_us, way_points_m)
+    return Headings(time_us=time_us, heading_rad=heading_rad)
+
+
+def _heading_rad(
+    time_us: NDArray[np.int64], passed_us: NDArray[np.int64], way_points_m: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    leg = np.minimum(np.searchsorted(passed_us, time_us, side="right") - 1, len(passed_us) - 2)
+    along = np.diff(way_points_m, axis=0)[leg]
+    heading_rad: NDArray[np.float64] = np.arctan2(along[:, 1], along[:, 0])
+    return heading_rad
+
+
+def _imu(passed_us: NDArray[np.int64], way_points_m: NDArray[np.float64]) -> Imu:
+    """Samples of a phone held flat, its y axis ahead, that bounces once a step."""
+    time_us = np.arange(0, int(passed_us[-1]) + 1, _IMU_US)
+    heading_rad = _turned(_heading_rad(time_us, passed_us, way_points_m))
+    turn_rate_rad_s = np.diff(heading_rad, prepend=heading_rad[0]) / (_IMU_US * 1e-6)
+    none = np.zeros(len(time_us))
+    bounce_m_s2 = _BOUNCE_M_S2 * np.sin(2.0 * np.pi * time_us / _STEP_US)
     return Imu(
         time_us=time_us,
-        acceleration_x_m_s2=still,
-        acceleration_y_m_s2=still,
-        acceleration_z_m_s2=still + _GRAVITY_M_S2,
-        angular_rate_x_rad_s=still,
-        angular_rate_y_rad_s=still,
-        angular_rate_z_rad_s=still,
-        magnetic_field_x_ut=still,
-        magnetic_field_y_ut=still + 20.0,
-        magnetic_field_z_ut=still - 45.0,
+        acceleration_x_m_s2=none,
+        acceleration_y_m_s2=none,
+        acceleration_z_m_s2=_GRAVITY_M_S2 + bounce_m_s2,
+        angular_rate_x_rad_s=none,
+        angular_rate_y_rad_s=none,
+        angular_rate_z_rad_s=turn_rate_rad_s,
+        magnetic_field_x_ut=-20.0 * np.cos(heading_rad),
+        magnetic_field_y_ut=20.0 * np.sin(heading_rad),
+        magnetic_field_z_ut=none - 45.0,
     )
+
+
+def _turned(heading_rad: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Headings that turn evenly at the corners, not wrapped."""
+    padded = np.pad(np.unwrap(heading_rad), (_TURN_SAMPLES - 1, 0), mode="edge")
+    return np.convolve(padded, np.full(_TURN_SAMPLES, 1.0 / _TURN_SAMPLES), mode="valid")

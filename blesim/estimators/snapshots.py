@@ -37,7 +37,8 @@ def inputs_of(recording: Recording) -> list[Any]:
 def same(a: Any, b: Any) -> bool:
     """Whether two values are equal, arrays inside them by their elements."""
     if isinstance(a, np.ndarray) or isinstance(b, np.ndarray):
-        return np.array_equal(a, b)
+        # What was not told is NaN, and stays the same.
+        return np.array_equal(a, b, equal_nan=np.asarray(a).dtype.kind == "f")
     if isinstance(a, dict) and isinstance(b, dict):
         return a.keys() == b.keys() and all(same(a[key], b[key]) for key in a)
     if isinstance(a, list | tuple) and isinstance(b, list | tuple):
