@@ -1,5 +1,7 @@
 """`blesim estimate`: a recording becomes tracks."""
 
+import os
+from contextlib import closing
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +25,10 @@ def estimate(
         int | None,
         typer.Option(help="Seed of estimators that draw [default: from the recording's digest]."),
     ] = None,
+    jobs: Annotated[
+        int | None,
+        typer.Option(min=1, help="Processes; the tracks are the same [default: as many as fit]."),
+    ] = None,
 ) -> None:
     """Position the walks of a recording with one or more estimators.
 
@@ -32,29 +38,18 @@ def estimate(
     from blesim.dataset.tracks import TrackSet, sha256_of, write_tracks
     from blesim.errors import UsageError
     from blesim.estimators.registry import make_estimator
-    from blesim.estimators.run import fit, follow, refuse_missing
-    from blesim.recording import Failure, WalkKind
+    from blesim.estimators.trials import Trials
+    from blesim.recording import Failure
 
     made = dict(make_estimator(text) for text in estimator)
     if len(made) < len(estimator):
         raise UsageError("the same estimator with the same settings is named twice")
     opened = read_recording(recording)
-    walks = [walk for walk in opened.walks if walk.kind == WalkKind.WALK]
-    for label, each in made.items():
-        for walk in walks:
-            refuse_missing(each, opened, walk, label)
     digest = sha256_of(recording)
     chosen_seed = int(digest[:16], 16) if seed is None else seed
-    runs = {}
-    for label, each in made.items():
-        fitted = fit(each, opened)
-        for walk in progress(walks, len(walks), label):
-            result = (
-                fitted
-                if isinstance(fitted, Failure)
-                else follow(fitted, opened.venue, walk, seed=chosen_seed, label=label)
-            )
-            runs[label, walk.name] = result
+    trials = Trials(estimators=made, recording=opened, seed=chosen_seed)
+    with closing(trials.results(jobs or _jobs(len(made)))) as results:
+        runs = dict(progress(results, len(trials), "track"))
     target = output_path(output, f"{recording.stem}-tracks.h5")
     write_tracks(target, TrackSet(recording_sha256=digest, runs=runs))
     failures = {key: run for key, run in runs.items() if isinstance(run, Failure)}
@@ -63,3 +58,8 @@ def estimate(
     say(f"{target}: {len(runs) - len(failures)} tracks")
     if failures:
         raise typer.Exit(1)
+
+
+def _jobs(estimators: int) -> int:
+    """As many processes as there are estimators to try and processors to try them on."""
+    return max(1, min(estimators, os.cpu_count() or 1))

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from blesim.cli.console import answer_json, answer_table
+from blesim.cli.console import answer, answer_json
 
 
 def estimators(
@@ -18,15 +18,9 @@ def estimators(
     if as_json:
         answer_json([asdict(each) for each in described])
         return
-    answer_table(
-        "Estimators",
-        ("name", "needs", "parameters"),
-        [
-            (
-                each.name,
-                each.fault or ", ".join(each.needs) or "RSSI readings alone",
-                tuple(f"{p.name}={p.default}  ({p.type})" for p in each.parameters),
-            )
-            for each in described
-        ],
-    )
+    for each in described:
+        answer(f"{each.name}: {each.fault or each.summary}")
+        if each.fault is None:
+            answer(f"    needs {', '.join(each.needs) or 'RSSI readings alone'}")
+        for parameter in each.parameters:
+            answer(f"    {parameter.name}={parameter.default}  ({parameter.type})")
