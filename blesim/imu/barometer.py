@@ -28,12 +28,12 @@ class Barometer(Settings):
     rate_hz : float
         Samples a second. [Hz]
     noise_pa : float
-        Spread of a sample: 1.3 over the full bandwidth at the highest resolution, 0.2 with the
-        strongest filter (data sheet). [Pa]
+        Spread of a sample: 1.3 over the full bandwidth at the highest resolution (typical, not
+        verified against the data sheet), 0.2 with the strongest filter (its table 7: 1.6 cm). [Pa]
     offset_pa : float
         Spread, from phone to phone, of the constant error: absolute accuracy 100 (data sheet). [Pa]
     resolution_pa : float
-        Step of the readings: 0.16 (data sheet); 0 for none. [Pa]
+        Step of the readings: 0.16 (data sheet, table 4); 0 for none. [Pa]
     sea_level_hpa : float
         Mean pressure at sea level; 1013.25 in the standard atmosphere. [hPa]
     weather_hpa, weather_s : float

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from blesim.imu.carriage import HEIGHT, MODES, ORDERED, SWITCH_S, attitude
+from blesim.imu.carriage import ATTITUDES, HEIGHT, MODES, ORDERED, SWITCH_S
 from blesim.rng import Draws
 from blesim.tables import Carrying
 from blesim.units import MICROSECONDS_PER_SECOND
@@ -50,7 +50,7 @@ def _attitudes(carrying: Carrying, seed: int, walker: str) -> NDArray[np.float64
     draws = Draws(seed=seed, purpose="hold", walker=walker).normals(np.arange(len(carrying)))
     spread_rad = np.radians([ORDERED[mode].hold_deg for mode in carrying.carrying])
     turned = Rotation.from_rotvec(spread_rad[:, None] * draws[:, :3]).as_matrix()
-    return turned @ np.stack([attitude(ORDERED[mode]) for mode in carrying.carrying])
+    return turned @ ATTITUDES[carrying.carrying]
 
 
 def _add_switches(rows: NDArray[np.float64], attitudes: NDArray[np.float64]) -> None:

@@ -19,9 +19,14 @@ WAVES = 12
 class Magnetics(Settings):
     """The magnetic field of a venue.
 
-    With the defaults, compass headings are off by 11 to 14 degrees from one straight stretch to
-    another and by about 5 within one, as measured, and the magnitude varies by about 5 uT along a
-    walk (2.7 to 4.1 measured on three).
+    With the defaults, compass headings are off by 11 to 12 degrees from one straight stretch to
+    another and by about 5 within one (11 to 14 and 5.8 measured), and the magnitude varies by a
+    median of 5.0 uT along a walk. On six walks through a mall it varied by 2.7 to 7.3 uT, median
+    3.7. Both cannot be met: waves without sources and a bias of b need a horizontal spread of
+    ``b F cos I`` for an Earth field F of inclination I, and with it the magnitude spreads by
+    ``b F cos I sqrt(1 + sin^2 I)``, here 0.47 uT a degree. Of walks whose offset is taken off,
+    3.0 and 1.0 uT of anomalies and clutter give 4.0 uT and 9.1 degrees; waves of 200 m give 3.9 uT
+    and 10.2 degrees; in the level field of that mall, 28 uT, it would be more uT a degree still.
 
     Attributes
     ----------

@@ -1,8 +1,9 @@
 """Inertial and magnetic sensors by name, as in phones.
 
-Noise densities are typical values of the data sheets named. Offsets there are those of a chip as
-soldered; what an application gets has been calibrated by the system, to an assumed fifth for
-accelerometers and to a tenth of a degree per second for gyroscopes. Drift: assumed.
+Where it is said so, numbers are typical, not verified against the data sheet. Offsets in data
+sheets are those of a chip as soldered; what an application gets has been calibrated by the system,
+to an assumed fifth for accelerometers and to a tenth of a degree per second for gyroscopes. Drift:
+assumed.
 """
 
 from collections.abc import Mapping
@@ -12,7 +13,8 @@ from blesim.imu.sensors import Accelerometer, Gyroscope, ImuSettings, Magnetomet
 
 IMU_PROFILES: Mapping[str, ImuSettings] = MappingProxyType(
     {
-        # Bosch BMI160 (BST-BMI160-DS000: 180 ug and 7 mdeg/s per root hertz, 40 mg) with AKM
+        # Bosch BMI160 (180 ug per root hertz and 40 mg: Bosch's list of its features, as resellers
+        # repeat it; 7 mdeg/s per root hertz: typical, not verified against the data sheet) with AKM
         # AK09911: the phones of ilc20, whose files tell resolutions and ranges; noise of the
         # magnetometer measured there, 0.84 uT in |B|.
         "bmi160-ak09911": ImuSettings(
@@ -30,8 +32,9 @@ IMU_PROFILES: Mapping[str, ImuSettings] = MappingProxyType(
             ),
             magnetometer=Magnetometer(noise_ut=0.82, resolution_ut=0.5996704, range_ut=4911.9995),
         ),
-        # ST LSM6DSO (data sheet: 70 ug, 3.8 mdeg/s per root hertz; 20 mg), set to 8 g and 2000
-        # deg/s (0.244 mg and 70 mdeg/s a digit), with AKM AK09918 (0.15 uT a digit).
+        # ST LSM6DSO, set to 8 g and 2000 deg/s (16 bits; 70 mdeg/s a digit: DS12140), with AKM
+        # AK09918. 70 ug and 3.8 mdeg/s per root hertz, 20 mg, 0.3 uT, 0.15 uT a digit: typical, not
+        # verified against the data sheet.
         "lsm6dso-ak09918": ImuSettings(
             accelerometer=Accelerometer(
                 noise_ug_per_rthz=70.0,
@@ -47,8 +50,9 @@ IMU_PROFILES: Mapping[str, ImuSettings] = MappingProxyType(
             ),
             magnetometer=Magnetometer(noise_ut=0.3, resolution_ut=0.15, range_ut=4911.9995),
         ),
-        # InvenSense MPU-6500 (data sheet: 300 ug, 10 mdeg/s per root hertz; 60 mg), as in phones of
-        # 2014, set to 2 g (1/16384 g a digit) and 500 deg/s (1/65.5 deg/s), with AKM AK8963.
+        # InvenSense MPU-6500, as in phones of 2014, set to 2 g and 500 deg/s (16 bits: 1/16384 g
+        # and 1/65.5 deg/s a digit), with AKM AK8963. 300 ug and 10 mdeg/s per root hertz, 60 mg,
+        # 0.4 uT, 0.15 uT a digit: typical, not verified against the data sheet.
         "mpu6500-ak8963": ImuSettings(
             accelerometer=Accelerometer(
                 noise_ug_per_rthz=300.0,

@@ -1,5 +1,7 @@
 """Each way of carrying shows the steps taken, as hard as they were measured."""
 
+import csv
+import gzip
 from itertools import pairwise
 
 import numpy as np
@@ -14,6 +16,8 @@ from blesim.tables import StepTruth
 from blesim.walkers.gait import Gait
 
 WALKERS = 6
+# Steps too few or too many over the strides of the recorded pockets: see the test of it.
+RECORDED_POCKET_OFF = 9 / 2054
 
 
 def magnitude(imu, axes):
@@ -26,13 +30,18 @@ def heights(imu, steps, norm):
     return np.array([np.ptp(norm[a:b]) for a, b in pairwise(cuts)])
 
 
-def peaks_us(imu, norm, rate_hz):
-    """Times of peaks of the band-passed magnitude, at least 0.4 periods apart."""
+def peaks_at(norm, rate_hz):
+    """Samples, at 50 Hz, of peaks of the band-passed magnitude, at least 0.4 periods apart."""
     band = butter(2, [0.7, 1.4 * rate_hz], btype="band", fs=50.0, output="sos")
     passed = sosfiltfilt(band, norm - norm.mean())
     apart = max(int(0.4 * 50.0 / rate_hz), 1)
     found, _ = find_peaks(passed, height=0.2 * passed.std(), distance=apart)
-    return imu.time_us[found]
+    return found
+
+
+def peaks_us(imu, norm, rate_hz):
+    """Times of peaks of the magnitude."""
+    return imu.time_us[peaks_at(norm, rate_hz)]
 
 
 def peaks_per_step(imu, steps, norm):
@@ -66,7 +75,7 @@ def test_waveforms_are_scaled_to_their_peak_to_peak():
     assert np.abs(ANGULAR).max() < np.radians(30)
 
 
-@pytest.mark.parametrize("mode", ["hand", "flat", "pocket"])
+@pytest.mark.parametrize("mode", ["hand", "flat"])
 @pytest.mark.parametrize("speed_m_s", [0.8, 1.0, 1.25, 1.5])
 def test_walking_there_is_a_peak_for_each_step(mode, speed_m_s, felt, route, axes):
     walk = route([(0, 0), (60, 0)], speed_m_s=speed_m_s)
@@ -78,7 +87,7 @@ def test_walking_there_is_a_peak_for_each_step(mode, speed_m_s, felt, route, axe
         assert dict(enumerate(counted[counted != 1])) == {}, np.flatnonzero(counted != 1)
 
 
-@pytest.mark.parametrize("mode", ["hand", "flat", "pocket"])
+@pytest.mark.parametrize("mode", ["hand", "flat"])
 @pytest.mark.parametrize("speed_m_s", [2.5, 3.0])
 def test_running_there_is_a_peak_for_each_step(mode, speed_m_s, felt, route, axes):
     walk = route([(0, 0), (100, 0)], speed_m_s=speed_m_s)
@@ -87,6 +96,68 @@ def test_running_there_is_a_peak_for_each_step(mode, speed_m_s, felt, route, axe
         imu, steps = felt(ImuSettings(), walk, mode, walker=f"w{number}", gait=even)
         counted = peaks_per_step(imu, steps, magnitude(imu, axes))
         assert dict(enumerate(counted[counted != 1])) == {}, np.flatnonzero(counted != 1)
+
+
+def _recorded_pocket(folder, name):
+    """Magnitude of a recording at 50 Hz, and the times at which the feet touched the floor."""
+    with gzip.open(folder / f"{name}_50hz.csv.gz", "rt") as lines:
+        table = np.loadtxt(lines, delimiter=",", skiprows=1)
+    steps_s = np.loadtxt(folder / f"{name}_steps.csv", skiprows=1)
+    return table[:, 0], np.linalg.norm(table[:, 1:4], axis=1), steps_s
+
+
+def _off_in_strides(found_s, steps_s):
+    """Peaks too few or too many over the strides of a recording, and their steps.
+
+    The clocks of foot and phone differ: taken is the shift, and the foot, with the fewest errors,
+    which flatters the recording and makes it the stricter measure of a simulated one.
+    """
+    tried = []
+    for foot in (0, 1):
+        for shift_s in np.arange(-0.6, 0.6, 0.02):
+            strides_s = steps_s[foot::2] + shift_s
+            # Longer ones are stops, or touches that the sensor missed.
+            whole = np.diff(strides_s) < 1.6
+            off = np.abs(np.histogram(found_s, strides_s)[0][whole] - 2).sum()
+            tried.append((off, 2 * whole.sum()))
+    return np.array(min(tried))
+
+
+def test_in_recorded_pockets_a_plain_detector_is_off_now_and_then(data_dir):
+    folder = data_dir("oxford_steps")
+    with open(folder / "index.csv", encoding="utf-8", newline="") as lines:
+        rows = [row for row in csv.DictReader(lines) if "pocket" in row["position"].lower()]
+    off, counted, by_hand = np.zeros(2, int), 0, 0
+    for row in rows:
+        if (folder / f"{row['recording']}_50hz.csv.gz").is_file():
+            time_s, norm, steps_s = _recorded_pocket(folder, row["recording"])
+            rate_hz = 1.0 / np.median((steps_s[2:] - steps_s[:-2]) / 2)
+            found_s = time_s[peaks_at(norm, rate_hz)]
+            off += _off_in_strides(found_s, steps_s)
+            counted += abs(len(found_s) - int(row["gt_steps"]))
+            by_hand += int(row["gt_steps"])
+    assert tuple(off) == (9, 2054)
+    # Against the steps counted by hand it is off by more: pocketing the phone looks like steps.
+    assert (counted, by_hand) == (56, 2136)
+
+
+@pytest.mark.parametrize("speeds_m_s", [(0.8, 1.0, 1.25, 1.5), (2.5, 3.0)], ids=["walk", "run"])
+def test_in_a_pocket_a_peak_lacks_no_more_often_than_in_recorded_ones(
+    speeds_m_s, felt, route, axes
+):
+    off = counted = 0
+    for speed_m_s in speeds_m_s:
+        walk = route([(0, 0), (60, 0)], speed_m_s=speed_m_s)
+        for number in range(4 * WALKERS):
+            imu, steps = felt(ImuSettings(), walk, "pocket", walker=f"w{number}")
+            # From the second step on: before the first and after the last nobody strides.
+            inner = peaks_per_step(imu, steps, magnitude(imu, axes))[1:-1]
+            strides = inner[: len(inner) // 2 * 2].reshape(-1, 2).sum(axis=1)
+            off += np.abs(strides - 2).sum()
+            counted += 2 * len(strides)
+    # Off are 2.4 of a thousand steps walking and 1.1 running: that 8646 and 2644 of them exceed
+    # the recorded 4.4 by chance happens less than once in a thousand other sets of walkers.
+    assert off <= RECORDED_POCKET_OFF * counted, (off, counted)
 
 
 def test_with_usual_intervals_a_plain_detector_is_off_by_few_per_cent(felt, route, axes):

@@ -22,6 +22,8 @@ EVERY_MODE = (
     (45, "hand"),
 )  # fmt: skip
 
+QUIET_M_S2 = {"flat": 0.13}
+
 
 @pytest.fixture
 def plain(monkeypatch):
@@ -48,7 +50,9 @@ def test_at_rest_the_specific_force_is_gravity(mode, felt, standing, perfect, ax
     force = np.linalg.norm(axes(imu, "acceleration"), axis=1)
     # 60 s of tremor that is forgotten within a tenth of a second: its mean is good to 0.02.
     assert force.mean() == pytest.approx(GRAVITY_M_S2, abs=0.02)
-    assert force.std() < 0.1
+    # The median half second in which nobody moved spreads by 0.08 m/s2 in hand, and by 0.13 on six
+    # walks of people who held the phone flat, standing at way points.
+    assert force.std() < QUIET_M_S2.get(mode, 0.085)
 
 
 def test_in_a_hand_at_rest_the_force_trembles_as_measured(felt, standing, axes):

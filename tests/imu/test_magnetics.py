@@ -92,11 +92,23 @@ def test_the_compass_has_a_bias_a_stretch_as_measured(errors_and_magnitudes):
     means, inside, _ = errors_and_magnitudes
     # Measured: 11 to 14 degrees between stretches, 5.8 within.
     assert 11.0 < means.std() < 14.0
+    # As it was measured, the offset of each walk taken off.
+    assert 11.0 < (means - means.mean(axis=1, keepdims=True)).std() < 14.0
     assert 3.0 < np.median(inside) < 7.0
     assert np.abs(means.mean()) < 5.0
 
 
 def test_the_magnitude_varies_along_a_walk_as_measured(errors_and_magnitudes):
     _, _, spreads = errors_and_magnitudes
-    # About 4 uT; 2.7 to 4.1 in three recordings, where the level field is stronger.
-    assert 3.0 < np.median(spreads) < 6.0
+    # Measured on six walks: 2.7 to 7.3 uT. Their median, 3.7, goes with less bias than measured:
+    # see Magnetics.
+    assert 2.7 < np.median(spreads) < 7.3
+
+
+def test_bias_and_magnitude_grow_together(errors_and_magnitudes):
+    means, _, spreads = errors_and_magnitudes
+    earth = Magnetics().earth_ut()
+    level, sine = np.hypot(*earth[:2]), earth[2] / np.linalg.norm(earth)
+    bias = np.radians((means - means.mean(axis=1, keepdims=True)).std())
+    # Walks of 240 m in 30 venues: good to a tenth, here to three.
+    assert np.median(spreads) == pytest.approx(bias * level * np.hypot(1.0, sine), rel=0.3)
