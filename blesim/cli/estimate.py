@@ -19,15 +19,15 @@ def estimate(
     ],
     output: Annotated[
         Path | None,
-        typer.Option("-o", "--output", help="Tracks [default: output/NAME-tracks.h5]."),
+        typer.Option("-o", "--output", help="Tracks (default: output/NAME-tracks.h5)."),
     ] = None,
     seed: Annotated[
         int | None,
-        typer.Option(help="Seed of estimators that draw [default: from the recording's digest]."),
+        typer.Option(help="Seed of estimators that draw (default: from the recording's digest)."),
     ] = None,
     jobs: Annotated[
         int | None,
-        typer.Option(min=1, help="Processes; the tracks are the same [default: as many as fit]."),
+        typer.Option(min=1, help="Processes; the tracks are the same (default: as many as fit)."),
     ] = None,
 ) -> None:
     """Position the walks of a recording with one or more estimators.

@@ -13,7 +13,7 @@ def import_(
     source_format: Annotated[str, typer.Argument(metavar="FORMAT", help="Such as philotuxo.")],
     source: Annotated[Path, typer.Argument(metavar="PATH", help="File or folder to read.")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Recording [default: output/FORMAT.h5].")
+        Path | None, typer.Option("-o", "--output", help="Recording (default: output/FORMAT.h5).")
     ] = None,
 ) -> None:
     """Turn somebody else's recording into one of ours."""

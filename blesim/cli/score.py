@@ -25,7 +25,7 @@ def score(
         typer.Option(help="Draw floor plan, tracks and error distribution (.png, .svg, .pdf)."),
     ] = None,
     plot_walk: Annotated[
-        str | None, typer.Option(help="Walk to draw over the plan [default: the first].")
+        str | None, typer.Option(help="Walk to draw over the plan (default: the first).")
     ] = None,
 ) -> None:
     """Print the error table: position error in metres after every reading, walk by walk.

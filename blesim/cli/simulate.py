@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def simulate(
     scenario: Annotated[Path, typer.Argument(help="Scenario file (YAML).")],
     output: Annotated[
-        Path | None, typer.Option("-o", "--output", help="Recording [default: output/NAME.h5].")
+        Path | None, typer.Option("-o", "--output", help="Recording (default: output/NAME.h5).")
     ] = None,
     seed: Annotated[
         int | None, typer.Option(help="Seed of all random numbers; overrides the scenario's.")

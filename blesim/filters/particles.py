@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import DataError
+from blesim.filters.exponentials import fill_exponentials
 from blesim.kernels import kernel
 
 Array = NDArray[np.float64]
@@ -39,8 +40,10 @@ def normalised(log_weights: Array) -> Array:
         raise DataError("log weights: there is none; give at least one particle")
     out = np.ones(len(log_weights))
     if largest > -np.inf:
+        fill_exponentials(log_weights - largest, out)
         for i in range(len(out)):
-            out[i] = np.exp(log_weights[i] - largest)
+            if log_weights[i] == -np.inf:
+                out[i] = 0.0
     out /= out.sum()
     return out
 

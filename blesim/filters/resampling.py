@@ -101,9 +101,10 @@ def multinomial(weights: Array, uniforms: Array, count: int) -> Indices:
     """Rows of `count` independent draws, (count,), from as many uniforms in [0, 1) (kernel)."""
     _refuse_too_few(uniforms, count)
     cumulated = _cumulated(weights)
+    guide, below = _guide(cumulated), _below_whole(cumulated)
     out = np.empty(count, np.int64)
     for i in range(count):
-        out[i] = _row_at(cumulated, uniforms[i])
+        out[i] = _row_at(cumulated, guide, below, uniforms[i])
     return out
 
 
@@ -112,10 +113,11 @@ def stratified(weights: Array, uniforms: Array, count: int) -> Indices:
     """Rows of one draw in each stratum, (count,), from as many uniforms in [0, 1) (kernel)."""
     _refuse_too_few(uniforms, count)
     cumulated = _cumulated(weights)
+    below = _below_whole(cumulated)
     out = np.empty(count, np.int64)
     row = 0
     for i in range(count):
-        row = _next_row(cumulated, (i + uniforms[i]) / count, row)
+        row = _next_row(cumulated, below, (i + uniforms[i]) / count, row)
         out[i] = row
     return out
 
@@ -125,10 +127,11 @@ def systematic(weights: Array, uniforms: Array, count: int) -> Indices:
     """Rows at equal distances, (count,), from the first of the uniforms in [0, 1) (kernel)."""
     _refuse_too_few(uniforms, 1)
     cumulated = _cumulated(weights)
+    below = _below_whole(cumulated)
     out = np.empty(count, np.int64)
     row = 0
     for i in range(count):
-        row = _next_row(cumulated, (i + uniforms[0]) / count, row)
+        row = _next_row(cumulated, below, (i + uniforms[0]) / count, row)
         out[i] = row
     return out
 
@@ -178,33 +181,55 @@ def _largest(weights: Array) -> float:
 def _cumulated(weights: Array) -> Array:
     """Running total of the weights as shares of the largest; 1, 2, ... where all are zero."""
     largest = _largest(weights)
-    out = np.empty(len(weights))
+    out = weights / largest if largest > 0.0 else np.ones(len(weights))
     total = 0.0
     for row in range(len(weights)):
-        total += weights[row] / largest if largest > 0.0 else 1.0
+        total += out[row]
         out[row] = total
     return out
 
 
 @kernel
-def _row_at(cumulated: Array, share: float) -> int:
-    """First row whose running total exceeds a share in [0, 1) of the whole: by bisection."""
-    # Rounded up to the whole, a share would name a row of weight zero at the end, or none.
-    place = min(share * cumulated[-1], np.nextafter(cumulated[-1], 0.0))
-    low, high = 0, len(cumulated) - 1
-    while low < high:
-        middle = (low + high) // 2
-        if cumulated[middle] > place:
-            high = middle
-        else:
-            low = middle + 1
-    return low
+def _below_whole(cumulated: Array) -> float:
+    """Largest number under the whole (kernel).
+
+    Rounded up to the whole, a share would name a row of weight zero at the end, or none.
+    """
+    return float(np.nextafter(cumulated[-1], 0.0))
 
 
 @kernel
-def _next_row(cumulated: Array, share: float, row: int) -> int:
-    """The same as `_row_at` for a share whose row is not before `row`: step by step."""
-    place = min(share * cumulated[-1], np.nextafter(cumulated[-1], 0.0))
+def _guide(cumulated: Array) -> Indices:
+    """First row whose running total exceeds each n-th of the whole, (n,) (kernel)."""
+    count = len(cumulated)
+    out = np.empty(count, np.int64)
+    row = 0
+    for i in range(count):
+        while row < count - 1 and cumulated[row] <= cumulated[-1] * (i / count):
+            row += 1
+        out[i] = row
+    return out
+
+
+@kernel
+def _row_at(cumulated: Array, guide: Indices, below: float, share: float) -> int:
+    """First row whose running total exceeds a share in [0, 1) of the whole (kernel).
+
+    The guide leads near it; a bisection would miss every other branch.
+    """
+    place = min(share * cumulated[-1], below)
+    row = int(guide[int(share * len(guide))])
+    while row > 0 and cumulated[row - 1] > place:
+        row -= 1
+    while cumulated[row] <= place:
+        row += 1
+    return row
+
+
+@kernel
+def _next_row(cumulated: Array, below: float, share: float, row: int) -> int:
+    """The same as `_row_at` for a share whose row is not before `row`: step by step (kernel)."""
+    place = min(share * cumulated[-1], below)
     while cumulated[row] <= place:
         row += 1
     return row

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
-from blesim.ranging.radio_map import RadioMap
+from blesim.ranging.radio_map import RadioMap, joined_radio_maps
 
 KernelName = Literal["squared exponential", "matern"]
 Silence = Literal["weak", "left out"]
@@ -116,13 +116,7 @@ def filled_radio_map(
         ]
     if not parts:
         raise UsageError(f"the radio map has nothing on level {level}; survey it, or fill another")
-    return _joined(parts)
-
-
-def _joined(parts: list[RadioMap]) -> RadioMap:
-    names = ("x_m", "y_m", "level", "direction", "mean_dbm", "spread_db", "count")
-    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return RadioMap(layout=parts[0].layout, **columns)
+    return joined_radio_maps(parts)
 
 
 def _filled(

@@ -14,12 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
+from blesim.kernels import kernel
 
 Loss = Literal["linear", "soft_l1"]
 # Beacons less than this off one line cannot tell its two sides apart.
 _ON_A_LINE_M = 0.1
 # An eigenvalue of the information below this share of all of it is none.
 _NO_INFORMATION = 1e-4
+# The search ends with a shorter step, or after so many.
+_ENOUGH_M, _MOST_STEPS = 1e-9, 200
 # No range is better known than this.
 _LEAST_SPREAD_M = 0.1
 
@@ -87,7 +90,8 @@ def laterate(
         Where the search begins, such as the last position; without it the mean of the beacons
         weighted by 1 / range. [m]
     loss : {"linear", "soft_l1"}
-        Squares, or less for ranges far off: see `scipy.optimize.least_squares`.
+        Squares z, or less for ranges far off, ``2 (sqrt(1 + z) - 1)``: see
+        `scipy.optimize.least_squares`.
 
     Returns
     -------
@@ -149,11 +153,15 @@ class _Links:
 
     def solved(self, start_m: NDArray[np.float64], loss: Loss) -> NDArray[np.float64]:
         """Place of the least squares near a start, (2,). [m]."""
-        from scipy.optimize import least_squares
-
-        method: Literal["lm", "trf"] = "lm" if loss == "linear" else "trf"
-        found = least_squares(self.residuals, start_m, self.jacobian, method=method, loss=loss)
-        return np.asarray(found.x, np.float64)
+        # One layout and one type, or the kernel is compiled anew.
+        return _descended(
+            np.ascontiguousarray(self.beacons_m, np.float64),
+            np.ascontiguousarray(self.ranges_m, np.float64),
+            np.ascontiguousarray(self.spreads_m, np.float64),
+            np.ascontiguousarray(start_m, np.float64),
+            self.height_m,
+            loss == "soft_l1",
+        )
 
     def covariance_m2(self, place_m: NDArray[np.float64], scale: float) -> NDArray[np.float64]:
         """Inverse of the information, scaled, (2, 2). [m2].
@@ -168,6 +176,79 @@ class _Links:
         widest_m2 = float(np.mean(self.ranges_m**2))
         variance_m2 = np.where(told, scale / np.where(told, information, 1.0), widest_m2)
         return np.asarray((axes * variance_m2) @ axes.T)
+
+
+@kernel
+def _descended(
+    beacons_m: NDArray[np.float64],
+    ranges_m: NDArray[np.float64],
+    spreads_m: NDArray[np.float64],
+    start_m: NDArray[np.float64],
+    height_m: float,
+    soft: bool,
+) -> NDArray[np.float64]:
+    """Place where the loss is least near a start, (2,), by Levenberg and Marquardt (kernel). [m].
+
+    The damping is Nielsen's (H. B. Nielsen, "Damping parameter in Marquardt's method", report
+    IMM-REP-1999-05, DTU). The soft loss is descended with weights ``1 / sqrt(1 + z)``, its
+    derivative.
+    """
+    x, y, damping, growth = start_m[0], start_m[1], 1e-3, 2.0
+    best = _normal_equations(beacons_m, ranges_m, spreads_m, x, y, height_m, soft)
+    for _ in range(_MOST_STEPS):
+        _, xx, xy, yy, right, up = best
+        more = damping * (xx + yy)
+        determinant = (xx + more) * (yy + more) - xy * xy
+        if not determinant > 0.0:
+            break
+        step_x = (xy * up - (yy + more) * right) / determinant
+        step_y = (xy * right - (xx + more) * up) / determinant
+        tried = _normal_equations(
+            beacons_m, ranges_m, spreads_m, x + step_x, y + step_y, height_m, soft
+        )
+        # Of the decrease that the linear model promises, the share that came.
+        promised = step_x * (more * step_x - right) + step_y * (more * step_y - up)
+        gain = (best[0] - tried[0]) / promised if promised > 0.0 else 0.0
+        if gain > 0.0:
+            x, y, best, growth = x + step_x, y + step_y, tried, 2.0
+            damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3)
+        else:
+            damping, growth = damping * growth, 2.0 * growth
+        if abs(step_x) + abs(step_y) < _ENOUGH_M:
+            break
+    return np.array([x, y])
+
+
+@kernel
+def _normal_equations(
+    beacons_m: NDArray[np.float64],
+    ranges_m: NDArray[np.float64],
+    spreads_m: NDArray[np.float64],
+    x: float,
+    y: float,
+    height_m: float,
+    soft: bool,
+) -> tuple[float, float, float, float, float, float]:
+    """Loss at a place, J'WJ (xx, xy, yy) and J'Wr (x, y) of the residuals r there (kernel)."""
+    loss, xx, xy, yy, right, up = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(len(ranges_m)):
+        along, across = x - beacons_m[k, 0], y - beacons_m[k, 1]
+        above = height_m - beacons_m[k, 2]
+        far = np.sqrt(along * along + across * across + above * above)
+        residual = (far - ranges_m[k]) / spreads_m[k]
+        square, weight = residual * residual, 1.0
+        if soft:
+            root = np.sqrt(1.0 + square)
+            square, weight = 2.0 * (root - 1.0), 1.0 / root
+        scale = 1.0 / (max(far, 1e-9) * spreads_m[k])
+        along, across = along * scale, across * scale
+        loss += square
+        xx += weight * along * along
+        xy += weight * along * across
+        yy += weight * across * across
+        right += weight * along * residual
+        up += weight * across * residual
+    return loss, xx, xy, yy, right, up
 
 
 def _refuse_bad(

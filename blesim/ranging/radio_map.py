@@ -5,7 +5,7 @@ places are the spots the tester stood at, or the cells of a grid, into which rea
 walking fall as well.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -124,6 +124,12 @@ class RadioMap:
 
 
 _ARRAYS = ("x_m", "y_m", "level", "direction", "mean_dbm", "spread_db", "count")
+
+
+def joined_radio_maps(parts: Sequence[RadioMap]) -> RadioMap:
+    """Radio map with the fingerprints of one or more maps of one layout and the same beacons."""
+    columns = {name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS}
+    return RadioMap(layout=parts[0].layout, **columns)
 
 
 def direction_of(heading_rad: ArrayLike, directions: int) -> NDArray[np.int64]:

@@ -16,7 +16,16 @@ from rich.console import Console
 from rich.table import Table
 
 # Files beside this one, each with a list ROWS; the slow imports of one do not disturb another.
-FILES = ("start_up", "line_of_sight", "recording_file", "radio", "filters", "imu", "trading_day")
+FILES = (
+    "start_up",
+    "line_of_sight",
+    "recording_file",
+    "radio",
+    "filters",
+    "imu",
+    "trading_day",
+    "graph_filter",
+)
 OUTPUT = Path(__file__).resolve().parents[2] / "output" / "bench.json"
 
 

@@ -20,13 +20,13 @@ from blesim.estimators.registry import describe, estimator_names, make_estimator
 from blesim.estimators.run import run
 
 recording = practice_recording()
-label, estimator = make_estimator("weighted-centroid:memory=0.9")
+label, estimator = make_estimator("my-centroid:memory=0.9")
 check_estimator(estimator)
 track = run(estimator, recording, recording.by_name["there"], seed=1, label=label)
 print(json.dumps({
     "names": estimator_names(),
     "rows": len(track),
-    "defaults": {p.name: p.default for p in describe("weighted-centroid").parameters},
+    "defaults": {p.name: p.default for p in describe("my-centroid").parameters},
     "fault": describe("broken-stranger").fault,
     "ours": describe("nearest-beacon").fault,
 }))
@@ -44,9 +44,7 @@ def readme_block(words):
 def installed(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stranger")
     source = shutil.copytree(HERE / "stranger", folder / "source")
-    (source / "my_estimator.py").write_text(
-        readme_block("class WeightedCentroid"), encoding="utf-8"
-    )
+    (source / "my_estimator.py").write_text(readme_block("class MyCentroid"), encoding="utf-8")
     options = ["--quiet", "--no-index", "--no-build-isolation", "--no-deps"]
     pip = [sys.executable, "-m", "pip", "--disable-pip-version-check", "install", *options]
     subprocess.run([*pip, "--target", str(folder / "site"), str(source)], check=True)
@@ -62,7 +60,7 @@ def test_the_estimator_of_another_package_is_found_checked_and_run(installed):
         text=True,
     )
     said = json.loads(answer.stdout)
-    assert {"nearest-beacon", "weighted-centroid"} <= set(said["names"])
+    assert {"nearest-beacon", "weighted-centroid", "my-centroid"} <= set(said["names"])
     assert said["rows"] > 100
     assert said["defaults"] == {"memory": "0.98"}
     assert "NotThere" in said["fault"]
@@ -76,5 +74,5 @@ def test_the_readme_declares_it_as_the_package_does(installed):
 
 
 def test_it_takes_thirty_lines_or_so():
-    code = [line for line in readme_block("class WeightedCentroid").splitlines() if line.strip()]
+    code = [line for line in readme_block("class MyCentroid").splitlines() if line.strip()]
     assert len(code) <= 32

@@ -175,6 +175,17 @@ def test_uniform_places_worked_by_hand() -> None:
     np.testing.assert_allclose(offset_m, [0.0, 2.0, 0.5], atol=1e-12)
 
 
+def test_uniform_places_among_some_edges() -> None:
+    arrays = GraphArrays.of(line())
+    uniforms = np.array([0.0, 0.5, np.nextafter(1.0, 0.0)])
+    edge, offset_m = arrays.uniform_places(uniforms, np.array([True, False]))
+    assert edge.tolist() == [0, 0, 0]
+    np.testing.assert_allclose(offset_m, [0.0, 1.5, 3.0])
+    edge, offset_m = arrays.uniform_places(uniforms, np.array([False, True]))
+    assert edge.tolist() == [1, 1, 1]
+    np.testing.assert_allclose(offset_m, [0.0, 2.0, 4.0])
+
+
 def test_a_key_is_drawn_from_the_generator() -> None:
     first, second = (motion_key(np.random.default_rng(5)) for _ in range(2))
     np.testing.assert_array_equal(first, second)
