@@ -1,6 +1,7 @@
 """The picture of a scored recording: tracks over the floor plan, error distributions beside it."""
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,6 +18,9 @@ from blesim.tables import Track, Trajectory
 from blesim.venue.venue import Venue
 
 _ERROR_SHARE = 0.99
+# More tracks than this are drawn with smaller dots.
+_FEW = 3
+_STYLES = (("-", "."), ("--", "x"), (":", "+"), ("-.", "1"))
 
 
 def draw_tracks(
@@ -67,16 +71,19 @@ def _draw_walk(
         *axes.plot([], [], "^", color=COLOURS[2], linestyle="none", label="beacon"),
         *axes.plot([], [], "o-", color=TRUTH, linewidth=2.2, label="true track, dot at the start"),
     ]
-    for colour, (label, track) in zip(_cycle(len(tracks)), tracks.items(), strict=True):
+    size = 6.0 if len(tracks) <= _FEW else 3.0
+    for look, (label, track) in zip(_looks(len(tracks)), tracks.items(), strict=True):
         poses = trajectory.at(track.time_us)
         estimates = np.stack([track.x_m, track.y_m], axis=1)
         ends = np.stack([np.stack([poses.x_m, poses.y_m], axis=1), estimates], axis=1)
-        axes.add_collection(LineCollection(list(ends), colors=colour, linewidths=0.4, alpha=0.35))
+        axes.add_collection(
+            LineCollection(list(ends), colors=look.colour, linewidths=0.4, alpha=0.35)
+        )
         labels += axes.plot(
             *estimates.T,
-            ".",
-            markersize=6,
-            color=colour,
+            look.marker,
+            markersize=size,
+            color=look.colour,
             zorder=5,
             label=f"estimates: {printable(label)}",
         )
@@ -93,10 +100,11 @@ def _draw_walk(
 
 def _draw_errors(axes: Axes, errors_m: Mapping[str, NDArray[np.float64]]) -> None:
     widest_m = 1.0
-    for colour, (label, errors) in zip(_cycle(len(errors_m)), errors_m.items(), strict=True):
+    for look, (label, errors) in zip(_looks(len(errors_m)), errors_m.items(), strict=True):
         ordered = np.sort(errors)
         share = np.arange(1, len(ordered) + 1) / max(len(ordered), 1)
-        axes.step(ordered, share, where="post", color=colour, linewidth=1.8, label=printable(label))
+        (line,) = axes.step(ordered, share, where="post", color=look.colour, linewidth=1.8)
+        line.set(linestyle=look.line, label=printable(label))
         if len(ordered):
             widest_m = max(widest_m, float(np.quantile(ordered, _ERROR_SHARE)))
     for level, name in ((0.5, "50 %"), (0.9, "90 %")):
@@ -117,5 +125,15 @@ def _take_literally(legend: Legend) -> None:
         text.set_parse_math(False)
 
 
-def _cycle(count: int) -> list[str]:
-    return [COLOURS[number % len(COLOURS)] for number in range(count)]
+class _Look(NamedTuple):
+    """How one of several estimators is drawn."""
+
+    colour: str
+    line: str
+    marker: str
+
+
+def _looks(count: int) -> list[_Look]:
+    """Looks of so many estimators: another line and marker each time the colours begin anew."""
+    looks = [_Look(colour, *style) for style in _STYLES for colour in COLOURS]
+    return [looks[number % len(looks)] for number in range(count)]
