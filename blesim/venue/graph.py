@@ -376,22 +376,40 @@ class AisleGraph:
             return None
         leaves = self.nodes[self.ends[start.edge, leave]].id
         enters = self.nodes[self.ends[end.edge, enter]].id
-        try:
-            nodes = nx.dijkstra_path(self.network, leaves, enters, weight="length_m")
-        except nx.NetworkXNoPath:
+        nodes = self._nodes_from(leaves).get(enters)
+        if nodes is None:
             return None
         return [out, *(self._leg(a, b) for a, b in pairwise(nodes)), into]
+
+    def _nodes_from(self, node: str) -> Mapping[str, Sequence[str]]:
+        """Nodes on the shortest way from one to each other that can be reached, found once."""
+        if node not in self._ways_found:
+            self._ways_found[node] = nx.single_source_dijkstra_path(
+                self.network, node, weight="length_m"
+            )
+        return self._ways_found[node]
+
+    @cached_property
+    def _ways_found(self) -> dict[str, Mapping[str, Sequence[str]]]:
+        return {}
 
     def _allowed(self, leg: Leg) -> bool:
         return not self.edges[leg.edge].one_way or leg.end_m >= leg.start_m - SAME_PLACE_M
 
     def _leg(self, first: str, second: str) -> Leg:
-        arcs = self.network[first][second].values()
-        row = min(arcs, key=lambda arc: float(arc["length_m"]))["edge"]
-        length_m = float(self.length_m[row])
-        return (
-            Leg(row, 0.0, length_m) if self.edges[row].first == first else Leg(row, length_m, 0.0)
-        )
+        return self._legs_between[first, second]
+
+    @cached_property
+    def _legs_between(self) -> Mapping[tuple[str, str], Leg]:
+        """The shortest edge from one node to another, walked from end to end."""
+        found: dict[tuple[str, str], Leg] = {}
+        for first, second, arc in self.network.edges(data=True):
+            row, length_m = arc["edge"], float(arc["length_m"])
+            forwards = self.edges[row].first == first
+            leg = Leg(row, 0.0, length_m) if forwards else Leg(row, length_m, 0.0)
+            if (first, second) not in found or length_m < found[first, second].length_m:
+                found[first, second] = leg
+        return found
 
     def describe(self, place: GraphPosition) -> str:
         """Words for a place: its node, or its distance along its edge."""

@@ -133,7 +133,8 @@ def simulate_day(
     Raises
     ------
     UsageError
-        If the day does not fit the venue; the first of its `faults`.
+        If the day does not fit the venue, the first of its `faults`; or if the tills cannot serve
+        everybody within half a day after closing.
     VenueError
         If an itinerary does not connect.
     InvariantError

@@ -68,12 +68,14 @@ def _unknown_names(day: TradingDay, venue: Venue) -> Iterator[Fault]:
     for row, dealt in enumerate(day.lists):
         for item, name in enumerate(dealt.sections):
             if name not in sections:
-                yield ("lists", row, "sections", item), f"there is no section '{name}' on the map"
+                path = ("lists", row, "sections", item)
+                yield path, f"list of '{dealt.shopper}': there is no section '{name}' on the map"
     for row, route in enumerate(day.routes):
         for item, point in enumerate(route.points):
             path = ("routes", row, "points", item, "place")
             if point.place not in sections and point.place not in nodes:
-                yield path, f"there is neither a node nor a section '{point.place}' on the map"
+                reason = f"there is neither a node nor a section '{point.place}' on the map"
+                yield path, f"route of '{route.shopper}': {reason}"
 
 
 def _repeated(day: TradingDay) -> Iterator[Fault]:
@@ -87,7 +89,10 @@ def _repeated(day: TradingDay) -> Iterator[Fault]:
             yield ("routes", row, "shopper"), f"there are two routes of '{route.shopper}'"
         seen["routes"].add(route.shopper)
         if route.points[0].time_s * 1e6 >= day.open_us:
-            yield ("routes", row, "points", 0, "time_s"), "begins only after closing"
+            yield (
+                ("routes", row, "points", 0, "time_s"),
+                (f"route of '{route.shopper}': begins only after closing"),
+            )
 
 
 def _unreachable(day: TradingDay, venue: Venue, graph: AisleGraph) -> Iterator[Fault]:
@@ -100,7 +105,6 @@ def _unreachable(day: TradingDay, venue: Venue, graph: AisleGraph) -> Iterator[F
     for row in np.flatnonzero(~reached)[:3]:
         name = assortment.sections[row].id
         yield ("entrance",), f"no way leads from '{day.entrance}' to section '{name}'"
-    stops = [graph.at_node(place) for place in _replayed_nodes(day, graph)]
     for row, node in enumerate(day.tills.nodes):
         till = graph.at_node(node)
         back = np.isfinite(assortment.to_place_m(till)) | ~reached
@@ -112,15 +116,26 @@ def _unreachable(day: TradingDay, venue: Venue, graph: AisleGraph) -> Iterator[F
             yield path, f"no way leads from till '{node}' to '{day.way_out}', the way out"
         if not _leads(routes, entrance, till):
             yield path, f"no way leads from '{day.entrance}' to till '{node}'"
-        if any(not _leads(routes, entrance, s) or not _leads(routes, s, till) for s in stops):
-            yield ("routes",), f"a node of a route cannot be reached, or not left for till '{node}'"
     if not _leads(routes, entrance, way_out):
         yield ("exit",), f"no way leads from '{day.entrance}' to '{day.way_out}'"
+    yield from _unreachable_points(day, graph, routes)
 
 
-def _replayed_nodes(day: TradingDay, graph: AisleGraph) -> list[str]:
-    places = {point.place for route in day.routes for point in route.points}
-    return sorted(place for place in places if place in graph.node_row)
+def _unreachable_points(day: TradingDay, graph: AisleGraph, routes: Routes) -> Iterator[Fault]:
+    """Nodes of recorded routes that cannot be reached or left, the first of each route."""
+    entrance = graph.at_node(day.entrance)
+    tills = [graph.at_node(node) for node in day.tills.nodes]
+    named = {point.place for route in day.routes for point in route.points}
+    lost = set()
+    for node in named & graph.node_row.keys():
+        place = graph.at_node(node)
+        leaves = all(_leads(routes, place, till) for till in tills)
+        if not (_leads(routes, entrance, place) and leaves):
+            lost.add(node)
+    for row, route in enumerate(day.routes):
+        for item in [k for k, point in enumerate(route.points) if point.place in lost][:1]:
+            reason = f"node '{route.points[item].place}' cannot be reached, or not left for a till"
+            yield ("routes", row, "points", item, "place"), f"route of '{route.shopper}': {reason}"
 
 
 def _leads(routes: Routes, start: GraphPosition, end: GraphPosition) -> bool:

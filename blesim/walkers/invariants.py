@@ -9,9 +9,13 @@ from numpy.typing import NDArray
 from blesim import columns
 from blesim.errors import InvariantError
 from blesim.tables import Trajectory
+from blesim.units import wrap_angle
+from blesim.venue.graph import AisleGraph
 from blesim.venue.venue import Venue
+from blesim.walkers.clearance import graph_of
 from blesim.walkers.person import PersonLog
-from blesim.walkers.shop_floor import ShopFloor, Visit
+from blesim.walkers.shop_floor import ShopFloor
+from blesim.walkers.visit import Visit
 
 # Recorded positions are rounded to a micrometre.
 _ROUNDING_M = 1e-5
@@ -37,15 +41,19 @@ def check_visits(floor: ShopFloor) -> None:
 
 
 def _check_order(visit: Visit) -> None:
-    start_us = np.array(visit.starts_us)
-    duration_us = np.array([motion[0] for motion in visit.motions])
+    start_us, duration_us = np.array(visit.starts_us), visit.motions()[:, 0].astype(np.int64)
     ended_us = np.concatenate([[visit.came_us], (start_us + duration_us)[:-1]])
+    name = visit.visitor.name
     if np.any(start_us < ended_us) or np.any(duration_us < 0):
-        raise InvariantError(f"'{visit.visitor.name}' walks before having arrived")
+        raise InvariantError(f"'{name}' walks before having arrived")
+    if visit.came_us < visit.visitor.comes_us:
+        raise InvariantError(f"'{name}' came in before being at the door")
+    if start_us[-1] + duration_us[-1] > visit.left_us:
+        raise InvariantError(f"'{name}' walks on after having left")
 
 
 def check_people(people: Sequence[PersonLog], venue: Venue) -> None:
-    """Raise `InvariantError` if somebody left the walkable area, the route or the speed limits.
+    """Raise `InvariantError` if somebody left the walkable area, the route or the limits of pace.
 
     Parameters
     ----------
@@ -54,8 +62,10 @@ def check_people(people: Sequence[PersonLog], venue: Venue) -> None:
     venue : Venue
         Where they were.
     """
+    graph = graph_of(venue)
     for person in people:
         _check_walk(person)
+        _refuse_other_edges(person, graph)
     lines = [_line(person.trajectory) for person in people]
     levels = np.array([person.trajectory.level[0] for person in people])
     for level in np.unique(levels):
@@ -78,15 +88,40 @@ def _line(trajectory: Trajectory) -> shapely.LineString:
 
 def _check_walk(person: PersonLog) -> None:
     trajectory = person.trajectory
+    if np.any(np.diff(trajectory.time_us) <= 0):
+        raise InvariantError(f"'{person.name}': times do not ascend")
     way_m = np.hypot(np.diff(trajectory.x_m), np.diff(trajectory.y_m))
     _refuse_other_length(person, float(way_m.sum()), len(trajectory))
-    if trajectory.speed_m_s.max() > person.speed_m_s + 1e-5:
+    # On the line of speed between two knots the fastest moment is at one of its ends.
+    span_s = np.diff(trajectory.time_us) * 1e-6
+    if _fastest_m_s(trajectory).max() > person.speed_m_s + 1e-5:
         raise InvariantError(f"'{person.name}' walked faster than desired")
+    turned_rad = np.abs(wrap_angle(np.diff(trajectory.heading_rad)))
+    # Times are rounded to a microsecond, headings to a millionth.
+    if np.any(turned_rad > person.turn_rate_rad_s * (span_s + 2e-6) + 1e-5):
+        raise InvariantError(f"'{person.name}' turned faster than a person of that pace does")
     if (trajectory.time_us[0], trajectory.time_us[-1]) != (person.came_us, person.left_us):
         raise InvariantError(f"'{person.name}': the walk does not last from door to door")
     if np.any(way_m[trajectory.state[:-1] != _WALKING] > 0):
         raise InvariantError(f"'{person.name}' moved while standing")
     _refuse_other_speed(person, way_m)
+
+
+def _fastest_m_s(trajectory: Trajectory) -> NDArray[np.float64]:
+    """Highest speed from each knot to the next, (n - 1,). [m/s]."""
+    first_m_s = trajectory.speed_m_s[:-1]
+    change_m_s = trajectory.acceleration_m_s2[:-1] * np.diff(trajectory.time_us) * 1e-6
+    return np.asarray(first_m_s + np.maximum(change_m_s, 0.0), np.float64)
+
+
+def _refuse_other_edges(person: PersonLog, graph: AisleGraph) -> None:
+    """Raise if offsets leave their edges, or run along them faster than the person walks."""
+    trajectory = person.trajectory
+    beyond_m = trajectory.offset_m - graph.length_m[trajectory.edge]
+    if trajectory.offset_m.min() < 0.0 or beyond_m.max() > _ROUNDING_M:
+        raise InvariantError(f"'{person.name}': an offset lies beyond the end of its edge")
+    if np.any(np.abs(trajectory.edge_speed_m_s[:-1]) > _fastest_m_s(trajectory) + 1e-5):
+        raise InvariantError(f"'{person.name}' moved along an edge faster than walking")
 
 
 def _refuse_other_length(person: PersonLog, walked_m: float, knots: int) -> None:

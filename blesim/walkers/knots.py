@@ -10,21 +10,19 @@ from blesim import columns
 from blesim.tables import Trajectory
 from blesim.units import wrap_angle
 from blesim.venue.graph import AisleGraph
-from blesim.walkers.shop_floor import Visit
 from blesim.walkers.trip import (
     EDGE,
-    END,
     FACE,
     FACING,
     HEADING,
     LENGTH,
     PLACE,
-    START,
     TURN,
     Mover,
     X,
     Y,
 )
+from blesim.walkers.visit import Visit
 
 Floats = NDArray[np.float64]
 _STATE = dict(columns.STATES)
@@ -65,9 +63,8 @@ class Walked:
     @classmethod
     def of(cls, visit: Visit) -> Self:
         """Legs of a finished visit."""
-        legs = np.concatenate([plan.legs[:count] for plan, count in visit.parts])
+        legs, motions = visit.legs(), visit.motions()
         start_us = np.array(visit.starts_us, np.int64)
-        motions = np.array(visit.motions)
         listed = visit.parts[0][1]
         place = legs[:, PLACE].astype(np.int64)
         place[listed:] = -1
@@ -100,6 +97,8 @@ class Walked:
 def trajectory_of(walked: Walked, graph: AisleGraph, mover: Mover) -> Trajectory:
     """Knots of a walk: where the acceleration, the heading or the state changes.
 
+    A walker beside the centre line is at the offset of the point of the edge nearest by.
+
     Parameters
     ----------
     walked : Walked
@@ -119,9 +118,10 @@ def trajectory_of(walked: Walked, graph: AisleGraph, mover: Mover) -> Trajectory
     knots = np.concatenate([moving, resting], axis=1).reshape(-1, _FIELDS)
     kept = np.concatenate([moves, rests], axis=1).reshape(-1)
     last = walked.legs[-1]
-    end = [walked.end_us[-1], last[X], last[Y], last[HEADING], 0, 0, last[EDGE], last[END], 0, 0]
+    end = [walked.end_us[-1], last[X], last[Y], last[HEADING], 0, 0, last[EDGE], 0]
     knots = np.concatenate([knots[kept], [end]])
     edge = knots[:, 6].astype(np.int64)
+    offset_m, edge_speed_m_s = _beside(knots, edge, graph)
     return Trajectory(
         time_us=knots[:, 0].astype(np.int64),
         x_m=knots[:, 1],
@@ -131,14 +131,32 @@ def trajectory_of(walked: Walked, graph: AisleGraph, mover: Mover) -> Trajectory
         speed_m_s=knots[:, 4],
         acceleration_m_s2=knots[:, 5],
         edge=edge,
-        offset_m=knots[:, 7],
-        edge_speed_m_s=knots[:, 8],
-        state=knots[:, 9].astype(np.int64),
+        offset_m=offset_m,
+        edge_speed_m_s=edge_speed_m_s,
+        state=knots[:, 7].astype(np.int64),
     )
 
 
-# Time, x, y, heading, speed, acceleration, edge, offset, edge speed, state.
-_FIELDS = 10
+# Time, x, y, heading, speed, acceleration, edge, state.
+_FIELDS = 8
+
+
+def _beside(knots: Floats, edge: NDArray[np.int64], graph: AisleGraph) -> tuple[Floats, Floats]:
+    """Offset of each knot on its edge [m], and its mean rate until the next knot [m/s], (n,)."""
+    offset_m = _along_m(knots[:, 1:3], edge, graph)
+    span_s = np.diff(knots[:, 0]) * 1e-6
+    # The next knot may be on another edge, but the walk to it is still on this one.
+    rate_m_s = (_along_m(knots[1:, 1:3], edge[:-1], graph) - offset_m[:-1]) / span_s
+    speed_m_s, change_m_s2 = knots[:-1, 4], knots[:-1, 5]
+    # Times are whole microseconds: over a few of them a rate may come out above the speed.
+    fastest_m_s = np.maximum(speed_m_s, speed_m_s + change_m_s2 * span_s)
+    return offset_m, np.append(np.clip(rate_m_s, -fastest_m_s, fastest_m_s), 0.0)
+
+
+def _along_m(xy_m: Floats, edge: NDArray[np.int64], graph: AisleGraph) -> Floats:
+    """Offset of the place of each edge that is nearest to a map position, (n,). [m]."""
+    way_m = (xy_m - graph.node_xy_m[graph.ends[edge, 0]]) * graph.direction[edge]
+    return np.asarray(np.clip(way_m.sum(axis=1), 0.0, graph.length_m[edge]), np.float64)
 
 
 def _moving(walked: Walked, rate_m_s2: float, turn_rate: float) -> tuple[Floats, NDArray[np.bool_]]:
@@ -169,22 +187,14 @@ def _moving(walked: Walked, rate_m_s2: float, turn_rate: float) -> tuple[Floats,
     )
     heading = before_rad[:, None] + np.minimum(turned, 1.0) * bend_rad[:, None]
     heading[walked.turning_us > 0] = walked.legs[walked.turning_us > 0, HEADING, None]
-    offset_m = walked.legs[:, START, None] + share * (
-        walked.legs[:, END, None] - walked.legs[:, START, None]
-    )
     x_m, y_m = _between(walked, share)
     following_us = np.concatenate([at_us[:, 1:], duration_us[:, None]], axis=1)
-    span_s = (following_us - at_us) * 1e-6
-    following_m = np.concatenate([offset_m[:, 1:], walked.legs[:, END, None]], axis=1)
-    edge_speed = np.divide(
-        following_m - offset_m, span_s, out=np.zeros_like(span_s), where=span_s > 0
-    )
     columns_ = (
         walked.start_us[:, None] + at_us, x_m, y_m, heading, speed_m_s, change_m_s2,
-        np.broadcast_to(walked.legs[:, EDGE, None], x_m.shape), offset_m, edge_speed,
+        np.broadcast_to(walked.legs[:, EDGE, None], x_m.shape),
         np.full_like(x_m, _STATE["walking"]),
     )  # fmt: skip
-    return np.stack(columns_, axis=2), span_s > 0
+    return np.stack(columns_, axis=2), following_us > at_us
 
 
 def _profile(
@@ -230,9 +240,9 @@ def _resting(walked: Walked) -> tuple[Floats, NDArray[np.bool_]]:
     following_us = np.concatenate([time_us[:, 1:], until_us[:, None]], axis=1)
     knots = np.zeros((len(time_us), 3, _FIELDS))
     knots[:, :, 0] = time_us
-    for field, column in ((1, X), (2, Y), (6, EDGE), (7, END)):
+    for field, column in ((1, X), (2, Y), (6, EDGE)):
         knots[:, :, field] = walked.legs[:, column, None]
     knots[:, 0, 3] = walked.legs[:, HEADING]
     knots[:, 1:, 3] = _heading_after(walked)[:, None]
-    knots[:, :, 9] = (_STATE["turning"], _STATE["standing"], _STATE["turning"])
+    knots[:, :, 7] = (_STATE["turning"], _STATE["standing"], _STATE["turning"])
     return knots, following_us > time_us

@@ -9,8 +9,8 @@ from blesim.tables import Carrying, Trajectory
 from blesim.venue.graph import AisleGraph
 from blesim.walkers.gait import Gait
 from blesim.walkers.knots import Walked, trajectory_of
-from blesim.walkers.shop_floor import Visit
 from blesim.walkers.trip import LENGTH
+from blesim.walkers.visit import Visit
 from blesim.walkers.visitors import NO_SECTION, NO_SWITCH, Role
 
 
@@ -36,6 +36,8 @@ class PersonLog:
         Length of the way as planned. [m]
     speed_m_s : float
         Desired speed. [m/s]
+    turn_rate_rad_s : float
+        How fast the person turns. [rad/s]
     """
 
     name: str
@@ -49,6 +51,7 @@ class PersonLog:
     visits: tuple[tuple[str, int, int], ...]
     planned_m: float
     speed_m_s: float
+    turn_rate_rad_s: float
 
     @classmethod
     def of(cls, visit: Visit, graph: AisleGraph, sections: tuple[str, ...], gait: Gait) -> Self:
@@ -73,6 +76,7 @@ class PersonLog:
             ),
             planned_m=float(walked.legs[:, LENGTH].sum()),
             speed_m_s=visitor.mover.speed_m_s,
+            turn_rate_rad_s=visitor.mover.turn_rate_rad_s,
         )
 
 

@@ -6,77 +6,29 @@ from typing import Any
 
 import numpy as np
 import simpy
-from simpy.events import Timeout
 from simpy.resources.resource import Request
 
-from blesim.errors import InvariantError
+from blesim.errors import InvariantError, UsageError
 from blesim.units import MICROSECONDS_PER_SECOND
 from blesim.venue.graph import GraphPosition
-from blesim.walkers.motion import SLOWEST, crowd_factors, stretch_walked
+from blesim.walkers.alarm import Alarm
+from blesim.walkers.door import Door
+from blesim.walkers.motion import crowd_factors
 from blesim.walkers.tills import Party, Till
-from blesim.walkers.trip import (
-    EDGE,
-    FACE,
-    FREE,
-    LENGTH,
-    LIMIT,
-    PLACE,
-    RESTS,
-    TURN,
-    Ground,
-    Places,
-    Plan,
-    planned,
-)
+from blesim.walkers.trip import PLACE, Ground, Places, planned
+from blesim.walkers.visit import Course, Visit, crowd_factor_of
 from blesim.walkers.visitors import Visitor
 
 Process = Generator[simpy.Event, Any, None]
-# Duration [us]; speed at the start, speed held, speed at the end [m/s].
-Motion = tuple[int, float, float, float]
-# Turning to what one looks at, then waiting, below zero until when. [us]
-Rest = tuple[int, int]
-# Edge, turn before [us], motion with nobody in the way, rest at the end, length [m], limit [m/s].
-LegRow = tuple[int, int, Motion, Rest | None, float, float]
+Progress = Callable[[int, int], None]
 
 _NOWHERE = -1
-_NO_WAIT = [0, 0, 0]
-# At rest only to turn.
-_BEND: Rest = (0, 0)
+_NOT_NOW = -1
 _TOLD = 5
-Progress = Callable[[int, int], None]
 _PROGRESS_STEP_US = 300 * MICROSECONDS_PER_SECOND
-
-
-@dataclass(slots=True, eq=False)
-class Visit:
-    """What becomes of a visitor, written down as it happens.
-
-    Attributes
-    ----------
-    visitor : Visitor
-        Who.
-    rows : list of LegRow
-        Legs of the list, until the visitor sets out.
-    came_us, left_us : int
-        In through the door and out of it; -1 where that did not happen. [us]
-    starts_us : list of int
-        When each leg walked began. [us]
-    motions : list of Motion
-        How it was walked.
-    parts : list of (Plan, int)
-        Plans followed, and how many legs of each.
-    waits_for : str
-        What for, while the visitor waits for somebody else.
-    """
-
-    visitor: Visitor
-    rows: list[LegRow]
-    came_us: int = -1
-    left_us: int = -1
-    starts_us: list[int] = field(default_factory=list)
-    motions: list[Motion] = field(default_factory=list)
-    parts: list[tuple[Plan, int]] = field(default_factory=list)
-    waits_for: str = ""
+# So long after closing somebody may still be paying; assumed.
+_LAST_OUT_H = 12
+_HOUR_US = 3600 * MICROSECONDS_PER_SECOND
 
 
 @dataclass(slots=True, eq=False)
@@ -91,7 +43,7 @@ class ShopFloor:
         Where people walk.
     exit : GraphPosition
         Where they leave.
-    door : simpy.Resource
+    door : Door
         As many places as the store holds shoppers.
     tills : list of Till
         Where they pay.
@@ -104,7 +56,7 @@ class ShopFloor:
     factors : list of list of float
         Share of the desired speed on each edge by the number of others there.
     free_up_to : list of int
-        How many others on each edge slow nobody down.
+        How many on each edge slow nobody down, oneself among them.
     till_ways_m : list of list of float
         Way from the middle of each edge to each till. [m]
     """
@@ -112,7 +64,7 @@ class ShopFloor:
     env: simpy.Environment
     ground: Ground
     exit: GraphPosition
-    door: simpy.Resource
+    door: Door
     tills: list[Till]
     closed: simpy.Event
     closes_us: int
@@ -122,7 +74,6 @@ class ShopFloor:
     till_ways_m: list[list[float]]
     visits: list[Visit] = field(default_factory=list)
     parties: dict[str, Party] = field(default_factory=dict)
-    processes: list[tuple[simpy.Process, Visit]] = field(default_factory=list)
     gone: int = 0
 
     @classmethod
@@ -150,7 +101,7 @@ class ShopFloor:
             env=env,
             ground=ground,
             exit=graph.at_node(exit_node),
-            door=simpy.Resource(env, capacity),
+            door=Door(env, capacity),
             tills=[
                 Till(node=node, place=place, desk=simpy.Resource(env, servers))
                 for node, place in zip(tills, places, strict=True)
@@ -159,24 +110,22 @@ class ShopFloor:
             closes_us=closes_us,
             present=[0] * (len(graph.edges) + 1),
             factors=factors,
-            free_up_to=[sum(factor == 1.0 for factor in slowed) - 1 for slowed in factors],
+            free_up_to=[sum(factor == 1.0 for factor in slowed) for slowed in factors],
             till_ways_m=np.round(ways_m, 6).tolist(),
         )
 
     def expect(self, visitors: Iterable[Visitor]) -> None:
         """Await visitors, in any order."""
-        self.visits = [
-            Visit(visitor=visitor, rows=_rows(visitor.plan, visitor.wait_us.tolist()))
-            for visitor in visitors
-        ]
+        self.visits = [Visit(visitor=visitor) for visitor in visitors]
         coming = sorted(self.visits, key=lambda visit: visit.visitor.comes_us)
         self.env.process(self._arrive(coming))
 
     def _arrive(self, coming: list[Visit]) -> Process:
         """One process brings all to the door: the queue of events holds only who is there."""
+        alarm = Alarm(self.env)
         for visit in coming:
-            yield Timeout(self.env, visit.visitor.comes_us - int(self.env.now))
-            self.processes.append((self.env.process(self._stay(visit)), visit))
+            yield alarm.after(visit.visitor.comes_us - int(self.env.now))
+            self.env.process(self._stay(visit))
 
     def run(self, progress: Progress | None = None) -> None:
         """Let time pass until everybody has gone.
@@ -188,6 +137,8 @@ class ShopFloor:
 
         Raises
         ------
+        UsageError
+            If the tills cannot serve everybody within half a day after closing.
         InvariantError
             If some wait for each other, or for what never comes.
         """
@@ -195,7 +146,7 @@ class ShopFloor:
             self.env.run()
         else:
             while self.env.peek() < float("inf"):
-                self.env.run(until=int(self.env.now) + _PROGRESS_STEP_US)
+                self.env.run(until=int(self.env.peek()) + _PROGRESS_STEP_US)
                 # SimPy leaves the event that stopped it in the queue, for ever another one.
                 self.env.step()
                 progress(self.gone, len(self.visits))
@@ -203,13 +154,10 @@ class ShopFloor:
 
     def _stay(self, visit: Visit) -> Process:
         """The process of a visitor: door, list, till, door. One generator, as it is run often."""
-        env, present, visitor = self.env, self.present, visit.visitor
-        factors, free_up_to = self.factors, self.free_up_to
-        speed_m_s, rate_m_s2 = visitor.mover.speed_m_s, visitor.mover.rate_m_s2
-        shops = visitor.role == "shopper"
-        leave_by_us, starts_us, motions = visitor.leave_by_us, visit.starts_us, visit.motions
+        env, present, free_up_to = self.env, self.present, self.free_up_to
+        visitor, starts_us, after = visit.visitor, visit.starts_us, Alarm(self.env).after
         place_inside: Request | None = None
-        if shops:
+        if visitor.role == "shopper":
             place_inside = self.door.request()
             if not place_inside.triggered:
                 visit.waits_for = "a place in the store"
@@ -218,76 +166,68 @@ class ShopFloor:
             if env.now >= self.closes_us:
                 place_inside.cancel()
                 self.door.release(place_inside)
-                self.gone += 1
+                self._count_out(visit)
                 return
         # The process keeps the time itself: asking the clock is a call more a leg.
         visit.came_us = now_us = int(env.now)
-        plan = visitor.plan
-        rows, visit.rows = visit.rows, []
-        here, now_m_s = _NOWHERE, 0.0
-        shopping, paying = True, False
-        while True:
-            before = len(motions)
-            for edge, turn_us, motion, rest, length_m, limit_m_s in rows:
-                if turn_us:
-                    yield Timeout(env, turn_us)
-                    now_us += turn_us
+        here = _NOWHERE
+        now_m_s: float | None = None
+        course: Course | None = Course.along(
+            visitor.plan, 0, len(visitor.plan.legs), visitor.wait_us, visitor.leave_by_us
+        )
+        while course is not None:
+            if course.turn_us:
+                yield after(course.turn_us)
+                now_us += course.turn_us
+            begun, as_planned_until_us = len(starts_us), course.leave_by_us
+            for edge, span_us in zip(course.edges, course.spans_us, strict=True):
                 if edge != here:
                     present[here] -= 1
                     present[edge] += 1
                     here = edge
-                others = present[edge] - 1
-                if others > free_up_to[edge] or now_m_s != motion[1]:
-                    slowed = factors[edge]
-                    factor = slowed[others] if others < len(slowed) else SLOWEST
-                    seconds, held_m_s, end_m_s = stretch_walked(
-                        now_m_s, speed_m_s * factor, limit_m_s, length_m, rate_m_s2
-                    )
-                    motion = (int(seconds * 1e6 + 0.5), now_m_s, held_m_s, end_m_s)
                 starts_us.append(now_us)
-                motions.append(motion)
-                yield Timeout(env, motion[0])
-                now_us += motion[0]
-                if rest is None:
-                    now_m_s = motion[3]
+                then_us = now_us + span_us
+                if then_us < as_planned_until_us and present[edge] <= free_up_to[edge]:
+                    yield after(span_us)
+                    now_us = then_us
                     continue
-                now_m_s = 0.0
-                if rest is not _BEND:
-                    stay_us = rest[1] if rest[1] >= 0 else max(-rest[1] - now_us, 0)
-                    if shopping and now_us + stay_us > leave_by_us:
-                        stay_us = max(leave_by_us - now_us, 0)
-                    yield Timeout(env, rest[0] + stay_us)
-                    now_us += rest[0] + stay_us
-                if shopping and now_us >= leave_by_us:
+                row = len(starts_us) - 1
+                motion, span_us, now_m_s, breaks = course.hindered(
+                    course.first + row - begun,
+                    now_us,
+                    now_m_s,
+                    crowd_factor_of(self.factors[edge], present[edge] - 1),
+                    visitor.mover,
+                )
+                visit.hindrances.append((row, motion))
+                # At another speed than planned the next leg is none of those planned either.
+                as_planned_until_us = course.leave_by_us if now_m_s is None else _NOT_NOW
+                yield after(span_us)
+                now_us += span_us
+                if breaks:
                     break
-            walked = len(motions) - before
-            if shopping:
-                shopping, paying = False, shops
-                visit.parts.append((plan, walked))
-                plan = self._way_out(visit, plan, walked)
-                rows = _rows(plan, _NO_WAIT)
-                if paying:
-                    visit.parts.append((plan, len(plan.legs)))
-                    at_till = int(np.flatnonzero(plan.legs[:, PLACE] == 1)[0]) + 1
-                    rows, later = rows[:at_till], rows[at_till:]
-                else:
-                    visit.parts.append((plan, len(plan.legs)))
-            elif paying:
+            if course.plan is visitor.plan:
+                course = self._way_out(visit, len(starts_us))
+            elif course.end < len(course.plan.legs):
                 yield from self._pay(visit)
                 now_us = int(env.now)
-                paying, rows = False, later
+                course = Course.along(course.plan, course.end, len(course.plan.legs))
             else:
-                break
+                course = None
         present[here] -= 1
         visit.left_us = now_us
-        self.gone += 1
+        self._count_out(visit)
         if place_inside is not None:
             self.door.release(place_inside)
 
-    def _way_out(self, visit: Visit, plan: Plan, walked: int) -> Plan:
-        """Plan from where a visitor is to the exit, by a till for shoppers."""
+    def _count_out(self, visit: Visit) -> None:
+        visit.gone = True
+        self.gone += 1
+
+    def _way_out(self, visit: Visit, walked: int) -> Course:
+        """Course from the end of the last leg walked to the exit, for shoppers to a till first."""
         visitor = visit.visitor
-        here = plan.place(walked - 1)
+        here = visitor.plan.place(walked - 1)
         places = [here, self.exit]
         if visitor.role == "shopper":
             party = self.parties.setdefault(visitor.group or visitor.name, Party())
@@ -295,13 +235,16 @@ class ShopFloor:
                 party.till = self._shortest_queue(here)
                 party.till.bound += 1
             places.insert(1, party.till.place)
-        return planned(
+        plan = planned(
             self.ground,
             Places.at(places, [True] * len(places)),
             visitor.lanes,
             visitor.mover,
-            plan.stance(walked - 1),
+            visitor.plan.stance(walked - 1),
         )
+        visit.parts = [(visitor.plan, walked), (plan, len(plan.legs))]
+        to_next = plan.legs[:, PLACE].tolist().index(1.0) + 1
+        return Course.along(plan, 0, to_next)
 
     def _shortest_queue(self, here: GraphPosition) -> Till:
         """Till to which the fewest are bound; of several the nearest from the edge's middle."""
@@ -327,21 +270,37 @@ class ShopFloor:
             visit.waits_for = f"till '{till.node}'"
             yield turn
             visit.waits_for = ""
+        self._refuse_late(visit, till)
         till.serves.append(visitor.name)
-        yield Timeout(self.env, visitor.service_us)
+        yield self.env.timeout(visitor.service_us)
         till.serves.remove(visitor.name)
         till.bound -= 1
         till.desk.release(turn)
         party.paid.succeed()
 
-    def _refuse_deadlock(self) -> None:
-        stuck = [visit for process, visit in self.processes if process.is_alive]
-        if not stuck:
+    def _refuse_late(self, visit: Visit, till: Till) -> None:
+        """Raise if somebody will pay so late that the day would go on as if for ever."""
+        until_us = int(self.env.now) + visit.visitor.service_us - self.closes_us
+        if until_us <= _LAST_OUT_H * _HOUR_US:
             return
-        told = "; ".join(self._whom(visit) for visit in stuck[:_TOLD])
-        more = f"; and {len(stuck) - _TOLD} more" if len(stuck) > _TOLD else ""
-        at_s = self.env.now / MICROSECONDS_PER_SECOND
-        raise InvariantError(f"deadlock {at_s:.0f} s after opening: {told}{more}")
+        waiting = [other for other in self.visits if other.waits_for and other.came_us >= 0]
+        told = self._told(waiting) or "nobody else waits"
+        raise UsageError(
+            f"till '{till.node}' would serve '{visit.visitor.name}' until"
+            f" {until_us / _HOUR_US:.1f} h after closing, and {_LAST_OUT_H} h is the most: {told};"
+            " shorten tills.service, or give more tills or servers"
+        )
+
+    def _refuse_deadlock(self) -> None:
+        stuck = [visit for visit in self.visits if not visit.gone]
+        if stuck:
+            at_s = self.env.now / MICROSECONDS_PER_SECOND
+            raise InvariantError(f"deadlock {at_s:.0f} s after opening: {self._told(stuck)}")
+
+    def _told(self, waiting: list[Visit]) -> str:
+        """Who waits for what, of the first few."""
+        told = "; ".join(self._whom(visit) for visit in waiting[:_TOLD])
+        return told + (f"; and {len(waiting) - _TOLD} more" if len(waiting) > _TOLD else "")
 
     def _whom(self, visit: Visit) -> str:
         """What somebody waits for, and who has it."""
@@ -351,16 +310,3 @@ class ShopFloor:
                 served = ", ".join(till.serves) or f"{till.desk.count} who are gone"
                 return f"'{who}' waits for {what}, which serves {served}"
         return f"'{who}' waits for {what}"
-
-
-def _rows(plan: Plan, wait_us: list[int]) -> list[LegRow]:
-    """Legs of a plan as the process reads them; waits are those of the plan's places."""
-    rows: list[LegRow] = []
-    for leg in plan.legs.tolist():
-        rest: Rest | None = None
-        if leg[RESTS]:
-            wait = wait_us[int(leg[PLACE])] if leg[PLACE] >= 0 else 0
-            rest = (int(leg[FACE]), wait) if wait or leg[FACE] else _BEND
-        free = (int(leg[FREE]), *leg[FREE + 1 :])
-        rows.append((int(leg[EDGE]), int(leg[TURN]), free, rest, leg[LENGTH], leg[LIMIT]))
-    return rows

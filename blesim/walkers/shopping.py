@@ -1,24 +1,10 @@
-"""Shopping lists: drawn, dealt out, or read from files; and recorded routes."""
-
-import csv
-from collections.abc import Iterator, Sequence
-from pathlib import Path
+"""Shopping lists as they are drawn, and whims on the way."""
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from blesim.errors import DataError
 from blesim.rng import Draws, normals_of
-from blesim.settings import shortened
-from blesim.walkers.trading_day import (
-    Basket,
-    Detours,
-    RecordedRoute,
-    RoutePoint,
-    ShoppingList,
-    Spread,
-)
+from blesim.walkers.trading_day import Basket, Detours, Spread
 
 
 def basket_size(basket: Basket, normal: float, most: int) -> int:
@@ -117,84 +103,3 @@ def times_us(spread: Spread, uniforms: NDArray[np.float64]) -> NDArray[np.int64]
     """Log-normal times of U(0, 1) numbers, same shape, at most a day. [us]."""
     seconds = spread.median_s * np.exp(spread.spread * normals_of(uniforms))
     return np.round(np.minimum(seconds, 86400.0) * 1e6).astype(np.int64)
-
-
-def read_lists(path: Path) -> tuple[ShoppingList, ...]:
-    """Shopping lists of a CSV file with the columns ``shopper,section``, in order of the file.
-
-    Raises
-    ------
-    DataError
-        With ``file:line: reason``, if the file cannot be read or a row is wrong.
-    """
-    found: dict[str, list[str]] = {}
-    for _, (shopper, section) in _rows(path, ("shopper", "section")):
-        found.setdefault(shopper, []).append(section)
-    return tuple(
-        ShoppingList(shopper=shopper, sections=tuple(sections))
-        for shopper, sections in found.items()
-    )
-
-
-def read_routes(path: Path) -> tuple[RecordedRoute, ...]:
-    """Recorded routes of a CSV file with the columns ``shopper,time_s,place``.
-
-    The last column may be called ``node`` or ``section`` as well; times count from opening.
-
-    Raises
-    ------
-    DataError
-        With ``file:line: reason``, if the file cannot be read or a row is wrong.
-    """
-    found: dict[str, list[RoutePoint]] = {}
-    for line, (shopper, time_s, place) in _rows(
-        path, ("shopper", "time_s", ("place", "node", "section"))
-    ):
-        point = _point(path, line, time_s, place)
-        points = found.setdefault(shopper, [])
-        if points and point.time_s < points[-1].time_s:
-            raise DataError(f"{path}:{line}: time_s goes backwards for '{shopper}'; sort the rows")
-        points.append(point)
-    return tuple(RecordedRoute(shopper=who, points=tuple(way)) for who, way in found.items())
-
-
-def _point(path: Path, line: int, time_s: str, place: str) -> RoutePoint:
-    try:
-        return RoutePoint(place=place, time_s=float(time_s))
-    except ValidationError as fault:
-        first = fault.errors()[0]
-        where = ".".join(str(part) for part in first["loc"])
-        raise DataError(f"{path}:{line}: {where}: {first['msg']}") from None
-    except ValueError as fault:
-        raise DataError(f"{path}:{line}: {shortened(str(fault))}") from None
-
-
-def _rows(
-    path: Path, header: Sequence[str | tuple[str, ...]]
-) -> Iterator[tuple[int, tuple[str, ...]]]:
-    """Line number and values of each row of a CSV file that must have this header."""
-    named = [(name,) if isinstance(name, str) else name for name in header]
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as text:
-            reader = csv.reader(text)
-            first = [name.strip() for name in next(reader, [])]
-            fits = len(first) == len(named)
-            if not fits or any(n not in choice for n, choice in zip(first, named, strict=True)):
-                wanted = ",".join("|".join(choice) for choice in named)
-                raise DataError(f"{path}:1: the first line must be '{wanted}'")
-            count = 0
-            for row in reader:
-                if not row:
-                    continue
-                values = tuple(value.strip() for value in row)
-                if len(values) != len(named) or not all(values):
-                    raise DataError(
-                        f"{path}:{reader.line_num}: {len(named)} values are needed:"
-                        f" {','.join(first)}"
-                    )
-                count += 1
-                yield reader.line_num, values
-    except (OSError, UnicodeDecodeError, csv.Error) as fault:
-        raise DataError(f"{path}: cannot be read: {shortened(str(fault))}") from None
-    if not count:
-        raise DataError(f"{path}:1: holds no row; give at least one {','.join(first)}")

@@ -1,6 +1,7 @@
 """A survey on the spot: a tester stands at one place after the other and looks several ways."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -11,6 +12,8 @@ from blesim.columns import NO_EDGE
 from blesim.tables import Marks, Trajectory
 from blesim.units import MICROSECONDS_PER_SECOND, to_us, wrap_angle
 from blesim.venue.floor_plan import FloorPlan
+
+Place = tuple[float, float] | NDArray[np.float64]
 
 _STATE = dict(columns.STATES)
 # Nobody stands with half a shoulder in a shelf.
@@ -25,6 +28,8 @@ class SpotSurvey:
     ----------
     spots_m : ndarray of float64, (n, 2)
         Where to stand, in this order. [m]
+    corners_m : mapping of int to ndarray of float64, (k, 2)
+        Corners to go round on the way to a spot, by its row; without any the way is straight. [m]
     level : int
         Level of all of them.
     headings_rad : tuple of float
@@ -32,7 +37,7 @@ class SpotSurvey:
     stand_s : float
         How long to look each way. [s]
     speed_m_s : float
-        Pace from spot to spot, straight. [m/s]
+        Pace from spot to spot. [m/s]
     turn_rate_rad_s : float
         How fast the tester turns. [rad/s]
     start_s : float
@@ -40,6 +45,7 @@ class SpotSurvey:
     """
 
     spots_m: NDArray[np.float64]
+    corners_m: Mapping[int, NDArray[np.float64]] = field(default_factory=dict)
     level: int
     headings_rad: tuple[float, ...]
     stand_s: float
@@ -48,7 +54,12 @@ class SpotSurvey:
     start_s: float
 
 
-def grid_spots_m(plan: FloorPlan, level: int, spacing_m: float) -> NDArray[np.float64]:
+def grid_spots_m(
+    plan: FloorPlan,
+    level: int,
+    spacing_m: float,
+    area_m: tuple[float, float, float, float] | None = None,
+) -> NDArray[np.float64]:
     """Crossings of a square grid where somebody can stand, row by row and back, (n, 2). [m].
 
     Parameters
@@ -59,9 +70,12 @@ def grid_spots_m(plan: FloorPlan, level: int, spacing_m: float) -> NDArray[np.fl
         Which level.
     spacing_m : float
         Of the grid, whose first crossing is half a spacing off the corner of the level. [m]
+    area_m : tuple of four float, optional
+        West, south, east and north of the grid instead of the bounds of the level. [m]
     """
     free = shapely.buffer(plan.walkable[level], -_CLEARANCE_M)
-    west, south, east, north = plan.bounds(level, "the survey").bounds
+    shapely.prepare(free)
+    west, south, east, north = area_m or plan.bounds(level, "the survey").bounds
     columns_m = np.arange(west + spacing_m / 2, east, spacing_m)
     rows_m = np.arange(south + spacing_m / 2, north, spacing_m)
     lines = [
@@ -80,17 +94,11 @@ def survey_walk(survey: SpotSurvey) -> tuple[Trajectory, Marks]:
     knots: list[tuple[float, ...]] = []
     marks: list[tuple[float, ...]] = []
     now_us, heading_rad = to_us(survey.start_s), survey.headings_rad[0]
-    before_m = survey.spots_m[0]
-    for x_m, y_m in survey.spots_m.tolist():
-        way_m = float(np.hypot(x_m - before_m[0], y_m - before_m[1]))
-        if way_m > 0:
-            along_rad = float(np.arctan2(y_m - before_m[1], x_m - before_m[0]))
-            now_us = _turn(knots, now_us, before_m, (heading_rad, along_rad), survey)
-            duration_us = max(1, to_us(way_m / survey.speed_m_s))
-            speed_m_s = way_m / duration_us * MICROSECONDS_PER_SECOND
-            knots.append((now_us, *before_m, along_rad, speed_m_s, _STATE["walking"]))
-            now_us, heading_rad = now_us + duration_us, along_rad
-        before_m = (x_m, y_m)
+    before_m: Place = survey.spots_m[0]
+    for row, (x_m, y_m) in enumerate(survey.spots_m.tolist()):
+        for place_m in (*survey.corners_m.get(row, ()), (x_m, y_m)):
+            now_us, heading_rad = _go(knots, now_us, (before_m, place_m), heading_rad, survey)
+            before_m = place_m
         for look_rad in survey.headings_rad:
             now_us = _turn(knots, now_us, before_m, (heading_rad, look_rad), survey)
             heading_rad = look_rad
@@ -102,10 +110,30 @@ def survey_walk(survey: SpotSurvey) -> tuple[Trajectory, Marks]:
     return _trajectory(knots, survey.level), _marks(marks, survey.level)
 
 
+def _go(
+    knots: list[tuple[float, ...]],
+    now_us: int,
+    ends_m: tuple[Place, Place],
+    heading_rad: float,
+    survey: SpotSurvey,
+) -> tuple[int, float]:
+    """Time [us] and heading [rad] after a straight way from one place to another."""
+    start_m, end_m = ends_m
+    way_m = float(np.hypot(end_m[0] - start_m[0], end_m[1] - start_m[1]))
+    if way_m == 0:
+        return now_us, heading_rad
+    along_rad = float(np.arctan2(end_m[1] - start_m[1], end_m[0] - start_m[0]))
+    now_us = _turn(knots, now_us, start_m, (heading_rad, along_rad), survey)
+    duration_us = max(1, to_us(way_m / survey.speed_m_s))
+    speed_m_s = way_m / duration_us * MICROSECONDS_PER_SECOND
+    knots.append((now_us, *start_m, along_rad, speed_m_s, _STATE["walking"]))
+    return now_us + duration_us, along_rad
+
+
 def _turn(
     knots: list[tuple[float, ...]],
     now_us: int,
-    place_m: tuple[float, float] | NDArray[np.float64],
+    place_m: Place,
     headings_rad: tuple[float, float],
     survey: SpotSurvey,
 ) -> int:

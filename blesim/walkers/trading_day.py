@@ -13,6 +13,8 @@ from blesim.walkers.gait import Gait
 Clock = Annotated[str, Field(pattern=r"^([01]\d|2[0-3]):[0-5]\d$|^24:00$")]
 Share = Annotated[float, Field(ge=0, le=1)]
 _DAY_S = 86400
+MOST_SECTIONS = 1000
+MOST_POINTS = 10_000
 
 
 def clock_s(clock: Clock) -> int:
@@ -113,7 +115,7 @@ class ShoppingList(Settings):
     """Sections that one shopper looks for, by id, in the order of the list."""
 
     shopper: Name
-    sections: tuple[Name, ...] = Field(min_length=1, max_length=1000)
+    sections: tuple[Name, ...] = Field(min_length=1, max_length=MOST_SECTIONS)
 
 
 class RoutePoint(Settings):
@@ -127,7 +129,7 @@ class RecordedRoute(Settings):
     """Where a shopper was seen, in order of time since opening."""
 
     shopper: Name
-    points: tuple[RoutePoint, ...] = Field(min_length=1, max_length=10000)
+    points: tuple[RoutePoint, ...] = Field(min_length=1, max_length=MOST_POINTS)
 
     @model_validator(mode="after")
     def _in_order(self) -> "RecordedRoute":

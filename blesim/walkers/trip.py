@@ -1,7 +1,8 @@
 """A trip as planned: the legs that lead through its places, beside the centre lines."""
 
 from dataclasses import dataclass
-from math import isnan, pi, sqrt
+from functools import cache
+from math import isnan, nan, pi, sqrt
 from typing import Self
 
 import numpy as np
@@ -19,7 +20,7 @@ EDGE, START, END, PLACE, X, Y, LENGTH, HEADING, TURN, RESTS, FACING, FACE, LIMIT
 # Then what `motion.free_motion` tells.
 FREE = 13
 _COLUMNS = 17
-# Up to this angle people turn while they walk on; assumed.
+# Up to this angle people turn while they walk on, if there is time to; assumed.
 WALKED_THROUGH_RAD = pi / 3
 # Legs along one line but for rounding.
 _STRAIGHT_ON = 1.0 - 1e-6
@@ -66,13 +67,20 @@ class Places:
     @classmethod
     def at(cls, places: list[GraphPosition], rests: list[bool]) -> Self:
         """Places on the graph, to stand anywhere and look anywhere."""
+        aside_m, facing_rad = _anywhere(len(places))
         return cls(
             edge=np.array([place.edge for place in places], np.int64),
             offset_m=np.array([place.offset_m for place in places]),
             rests=np.array(rests, dtype=np.bool_),
-            aside_m=np.full((len(places), 2), np.nan),
-            facing_rad=np.full(len(places), np.nan),
+            aside_m=aside_m.copy(),
+            facing_rad=facing_rad.copy(),
         )
+
+
+@cache
+def _anywhere(count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """`Places.aside_m` and `Places.facing_rad` of so many places where both are free."""
+    return np.full((count, 2), np.nan), np.full(count, np.nan)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -163,10 +171,9 @@ def planned(
     """
     graph = ground.graph
     route = ground.routes.legs(places.edge, places.offset_m)
-    stance = np.full(4, np.nan)
-    stance[3] = 0.0
+    stance = np.array([nan, nan, nan, 0.0])
     if start is not None:
-        stance[:] = (start.x_m, start.y_m, start.heading_rad, start.ordinal)
+        stance = np.array([start.x_m, start.y_m, start.heading_rad, start.ordinal])
     legs, began, ended = _displaced(
         route, places.rests, places.aside_m, places.facing_rad, stance, address,
         graph.ends, graph.node_xy_m, graph.direction,
@@ -287,7 +294,10 @@ def _displaced(
             heading = ahead
         turn = _turned(ahead, heading)
         first = row == 0
-        if first or legs[row - 1, RESTS] > 0 or abs(turn) > WALKED_THROUGH_RAD:
+        # Nobody walks the leg faster than wished for: is that time enough to turn?
+        walked_through = abs(turn) <= WALKED_THROUGH_RAD
+        walked_through &= abs(turn) * wish_m_s <= length_m * turn_rate_rad_s
+        if first or legs[row - 1, RESTS] > 0 or not walked_through:
             legs[row, TURN] = _turn_us(turn, turn_rate_rad_s)
             if not first:
                 legs[row - 1, RESTS] = 1.0

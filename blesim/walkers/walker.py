@@ -7,7 +7,6 @@ from typing import Any, Self
 
 import numpy as np
 import simpy
-from numpy.typing import NDArray
 
 from blesim import columns
 from blesim.errors import InvariantError
@@ -15,6 +14,7 @@ from blesim.tables import Marks, Trajectory
 from blesim.units import MICROSECONDS_PER_SECOND, to_us, wrap_angle
 from blesim.venue.graph import SAME_PLACE_M, AisleGraph, GraphPosition, Leg
 from blesim.walkers.itinerary import Itinerary
+from blesim.walkers.landmarks import Landmarks
 from blesim.walkers.motion import limits_m_s
 from blesim.walkers.phases import Phase, passed_us, phases, steady
 
@@ -54,17 +54,24 @@ class Walker:
 
     Attributes
     ----------
+    landmarks : Landmarks
+        Of the graph; may be shared with others.
     present : list of int
         How many people are on each edge, and nowhere as the last; the walker counts among them.
     """
 
-    graph: AisleGraph
+    landmarks: Landmarks
     itinerary: Itinerary
     present: list[int]
     log: WalkLog = field(default_factory=WalkLog)
     heading_rad: float = 0.0
     speed_m_s: float = 0.0
     here: int = _NOWHERE
+
+    @property
+    def graph(self) -> AisleGraph:
+        """Where they walk."""
+        return self.landmarks.graph
 
     def walk(self, env: simpy.Environment) -> Process:
         """The process: wait for the start, then stop after stop to the end of the route."""
@@ -126,7 +133,7 @@ class Walker:
         parts = self._phases(leg, limit_m_s)
         duration_us = sum(part.duration_us for part in parts)
         sign = 1.0 if leg.end_m > leg.start_m else -1.0
-        for way_point_m, share in self._way_points_on(leg):
+        for way_point_m, share in self.landmarks.passed(self.itinerary.way_points, leg):
             time_us = env.now + passed_us(parts, share * leg.length_m, share * duration_us)
             self.log.marks.append((time_us, *way_point_m, self._level(leg.edge)))
         ends_m = [part.way_m for part in parts[1:]] + [leg.length_m]
@@ -154,7 +161,7 @@ class Walker:
         edge_speed_m_s: float = 0.0,
         since_us: int = 0,
     ) -> None:
-        x_m, y_m = self.graph.xy_m([place.edge], [place.offset_m])[0]
+        x_m, y_m = self.landmarks.xy_m(place)
         self.log.knots.append(
             (
                 env.now + since_us,
@@ -178,29 +185,12 @@ class Walker:
 
     def _press(self, env: simpy.Environment, place: GraphPosition) -> None:
         """Mark the start of the route, if it is a way point."""
-        x_m, y_m = self.graph.xy_m([place.edge], [place.offset_m])[0]
+        x_m, y_m = self.landmarks.xy_m(place)
         points = self.itinerary.way_points
         here = np.hypot(points.xy_m[:, 0] - x_m, points.xy_m[:, 1] - y_m) <= SAME_PLACE_M
         level = self._level(place.edge)
         if np.any(here & (points.level == level)):
             self.log.marks.append((env.now, x_m, y_m, level))
-
-    def _way_points_on(self, leg: Leg) -> list[tuple[NDArray[np.float64], float]]:
-        """Way points passed on a leg, its start left out, with the share of the leg before them."""
-        start_m, end_m = self.graph.xy_m([leg.edge, leg.edge], [leg.start_m, leg.end_m])
-        along = (end_m - start_m) / leg.length_m
-        points = self.itinerary.way_points
-        relative = points.xy_m - start_m
-        ahead_m = relative @ along
-        aside_m = np.abs(relative @ np.array([-along[1], along[0]]))
-        passed = (aside_m <= SAME_PLACE_M) & (ahead_m > SAME_PLACE_M)
-        passed &= ahead_m <= leg.length_m + SAME_PLACE_M
-        passed &= points.level == self._level(leg.edge)
-        found = [
-            (points.xy_m[row], min(float(ahead_m[row]) / leg.length_m, 1.0))
-            for row in np.flatnonzero(passed)
-        ]
-        return sorted(found, key=lambda pair: pair[1])
 
     def _heading_of(self, leg: Leg) -> float:
         x, y = self.graph.direction[leg.edge] * (1.0 if leg.end_m > leg.start_m else -1.0)
@@ -230,8 +220,10 @@ class Tour:
         present: list[int],
     ) -> Self:
         """Walkers who wait for their time to come; `present` as in `Walker`."""
+        landmarks = Landmarks(graph=graph)
         walkers = tuple(
-            Walker(graph=graph, itinerary=itinerary, present=present) for itinerary in itineraries
+            Walker(landmarks=landmarks, itinerary=itinerary, present=present)
+            for itinerary in itineraries
         )
         return cls(
             walkers=walkers,

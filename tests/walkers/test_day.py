@@ -125,6 +125,41 @@ def test_headings_follow_the_way(hour):
     assert np.abs(off).max() < 1e-4
 
 
+def test_offsets_are_those_of_the_nearest_point_of_the_edge(section, hour):
+    graph = section.graph
+    for person in hour.people:
+        trajectory = person.trajectory
+        first, second = graph.node_xy_m[graph.ends[trajectory.edge]].transpose(1, 0, 2)
+        lines = shapely.linestrings(np.stack([first, second], axis=1))
+        points = shapely.points(trajectory.x_m, trajectory.y_m)
+        nearest_m = shapely.line_locate_point(lines, points)
+        assert trajectory.offset_m == pytest.approx(nearest_m, abs=2e-6)
+        # The way to the next knot is on the edge of this one, whatever the next is on.
+        later_m = shapely.line_locate_point(lines[:-1], points[1:])
+        moved_m = trajectory.edge_speed_m_s[:-1] * np.diff(trajectory.time_us) * 1e-6
+        assert moved_m == pytest.approx(later_m - nearest_m[:-1], abs=1e-5)
+
+
+def test_nobody_gets_along_an_edge_faster_than_walking(hour):
+    for person in hour.people:
+        trajectory = person.trajectory
+        span_s = np.diff(trajectory.time_us) * 1e-6
+        before = trajectory.speed_m_s[:-1]
+        after = before + trajectory.acceleration_m_s2[:-1] * span_s
+        assert np.all(np.abs(trajectory.edge_speed_m_s[:-1]) <= np.maximum(before, after) + 3e-6)
+
+
+@pytest.mark.parametrize("turn_rate_deg_s", [20.0, 150.0])
+def test_nobody_turns_faster_than_told(section, turn_rate_deg_s):
+    day = trading_day(pace=Pace(turn_rate_deg_s=turn_rate_deg_s))
+    for person in simulate_day(section, day, (), 3).people:
+        turned = np.diff(np.unwrap(person.trajectory.heading_rad))
+        span_s = np.diff(person.trajectory.time_us) * 1e-6
+        # Headings are rounded to a millionth, times to a microsecond.
+        most = np.radians(turn_rate_deg_s) * (span_s + 1e-6) + 2e-6
+        assert np.all(np.abs(turned) <= most)
+
+
 def test_members_of_a_group_share_list_and_pace(section):
     day = trading_day(group_shares=(0.0, 0.0, 1.0), shoppers=45.0)
     found = simulate_day(section, day, (), 5)
@@ -298,4 +333,4 @@ def test_a_day_that_does_not_fit_is_refused(section):
         simulate_day(section, trading_day(tills=Tills(nodes=("D/west", "Z"))), (), 1)
 
 
-DIGEST = "db40088487ebff45"
+DIGEST = "c923367d114088f2"

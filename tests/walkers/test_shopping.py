@@ -2,12 +2,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from blesim.errors import DataError
 from blesim.walkers.shopping import (
     basket_size,
     drawn_sections,
-    read_lists,
-    read_routes,
     times_us,
     with_detours,
 )
@@ -70,43 +67,3 @@ def test_detours_pass_and_impulses_stop():
     never = Detours(probability=0.0, impulse_probability=0.0)
     same, _ = with_detours(np.array([0]), np.array([True]), neighbours, never, uniforms)
     assert same.tolist() == [0]
-
-
-def test_lists_are_read_in_order(tmp_path):
-    path = tmp_path / "lists.csv"
-    path.write_text("shopper,section\nann,A-02\nbob,B-01\nann,A-01\n")
-    lists = read_lists(path)
-    assert [each.shopper for each in lists] == ["ann", "bob"]
-    assert lists[0].sections == ("A-02", "A-01")
-
-
-def test_routes_are_read_in_order(tmp_path):
-    path = tmp_path / "routes.csv"
-    path.write_text("shopper,time_s,node\nann,10,A1\nann,60.5,A-02\n")
-    (route,) = read_routes(path)
-    assert [(point.place, point.time_s) for point in route.points] == [("A1", 10), ("A-02", 60.5)]
-
-
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
-        ("who,what\n", r":1: the first line must be 'shopper,time_s,place\|node\|section'"),
-        ("shopper,time_s,node\n", ":1: holds no row"),
-        ("shopper,time_s,node\nann,1,A1\nann,2\n", ":3: 3 values are needed"),
-        ("shopper,time_s,node\nann,soon,A1\n", ":2: could not convert"),
-        ("shopper,time_s,node\nann,-1,A1\n", ":2: time_s"),
-        ("shopper,time_s,node\nann,nan,A1\n", ":2: time_s"),
-        ("shopper,time_s,node\nann,5,A1\nann,4,A2\n", ":3: time_s goes backwards"),
-    ],
-)
-def test_bad_routes_are_refused_with_file_and_line(tmp_path, text, reason):
-    path = tmp_path / "routes.csv"
-    path.write_text(text)
-    with pytest.raises(DataError, match=f"routes.csv{reason}") as caught:
-        read_routes(path)
-    assert "\n" not in str(caught.value)
-
-
-def test_a_missing_file_is_told(tmp_path):
-    with pytest.raises(DataError, match=r"none\.csv: cannot be read"):
-        read_lists(tmp_path / "none.csv")

@@ -135,19 +135,19 @@ def test_a_day_that_fits_has_no_faults():
             {"lists": (ShoppingList(shopper="x", sections=("A-B", "no")),)},
             ("A-B",),
             ("lists", 0, "sections", 1),
-            "no section 'no'",
+            "list of 'x': there is no section 'no'",
         ),
         (
             {"routes": (RecordedRoute(shopper="x", points=(RoutePoint(place="Q", time_s=1.0),)),)},
             ("A-B",),
             ("routes", 0, "points", 0, "place"),
-            "neither a node nor a section 'Q'",
+            "route of 'x': there is neither a node nor a section 'Q'",
         ),
         (
             {"routes": (RecordedRoute(shopper="x", points=(RoutePoint(place="E", time_s=1.0),)),)},
             ("A-B",),
-            ("routes",),
-            "cannot be reached",
+            ("routes", 0, "points", 0, "place"),
+            "route of 'x': node 'E' cannot be reached",
         ),
         (
             {

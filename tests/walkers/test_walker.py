@@ -1,3 +1,4 @@
+import networkx as nx
 import numpy as np
 import pytest
 from shapely import box
@@ -160,7 +161,11 @@ def test_a_route_that_does_not_connect_is_refused():
         {"speed_m_s": 0.0},
         {"speed_m_s": -1.0},
         {"speed_m_s": float("nan")},
+        {"speed_m_s": 1e-300},
         {"turn_rate_rad_s": 0.0},
+        {"turn_rate_rad_s": 1e-300},
+        {"start_s": -1.0},
+        {"start_s": float("inf")},
         {"stops": stops("A")},
     ],
 )
@@ -169,7 +174,7 @@ def test_impossible_itineraries_are_refused(settings):
         walked(**settings)
 
 
-@pytest.mark.parametrize("pause_s", [-1.0, float("inf"), float("nan")])
+@pytest.mark.parametrize("pause_s", [-1.0, 1e300, float("inf"), float("nan")])
 def test_impossible_pauses_are_refused(pause_s):
     with pytest.raises(UsageError, match="pause"):
         Stop(place=GraphPosition(0, 0.0), pause_s=pause_s)
@@ -223,3 +228,23 @@ def test_who_accelerates_stops_for_pauses_and_goes_on_through_nodes():
 def test_impossible_accelerations_are_refused(rate):
     with pytest.raises(UsageError, match="acceleration_m_s2"):
         walked(acceleration_m_s2=rate)
+
+
+def test_ways_found_once_are_those_of_networkx_even_where_several_are_as_short(store):
+    graph = store.graph
+    names = [node.id for node in graph.nodes]
+    for start in names[::23]:
+        for end in names[::7]:
+            way = nx.dijkstra_path(graph.network, start, end, weight="length_m")
+            assert graph._nodes_from(start)[end] == way
+
+
+def test_way_points_are_the_same_whoever_walks_there():
+    points = at([2.5, 0.0], [10.0, 0.0])
+    others = at([4.0, 0.0])
+    walks = tuple(
+        Itinerary(walker=name, stops=stops("A", "B"), way_points=each)
+        for name, each in (("one", points), ("two", points), ("three", others))
+    )
+    pressed = [log.pressed().x_m.tolist() for log in simulate_walkers(GRAPH, walks)]
+    assert pressed == [[2.5, 10.0], [2.5, 10.0], [4.0]]
