@@ -1,6 +1,6 @@
 """Who takes part in a simulation: everybody in the venue, and those whose phones are recorded."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,10 +10,12 @@ from blesim.observe import Carrier
 from blesim.recording import Crowd, Person, Role, WalkKind
 from blesim.rng import Draws
 from blesim.scenario.build import Stage
+from blesim.scenario.carried import CarriedFrom
 from blesim.scenario.model import Scenario
+from blesim.scenario.reading import ScenarioFile
 from blesim.scenario.recorded import Record, ShopperPhones
 from blesim.scenario.walk_plan import WalkPlan
-from blesim.tables import Carrying, Visits
+from blesim.tables import Carrying, Trajectory, Visits
 from blesim.units import to_us
 from blesim.walkers.day import Day, simulate_day
 from blesim.walkers.gait import Gait
@@ -45,7 +47,7 @@ def everybody_in(stage: Stage, seed: int, progress: Progress | None = None) -> D
     return simulate_day(stage.built, stage.day, stage.itineraries, seed, progress)
 
 
-def carriers_of(scenario: Scenario, stage: Stage, day: Day, seed: int) -> tuple[Carrier, ...]:
+def carriers_of(file: ScenarioFile, stage: Stage, day: Day, seed: int) -> tuple[Carrier, ...]:
     """Whose phones are recorded: walks and surveys in the order of the scenario, then shoppers.
 
     Raises
@@ -53,11 +55,12 @@ def carriers_of(scenario: Scenario, stage: Stage, day: Day, seed: int) -> tuple[
     ScenarioError
         If more shoppers are to be recorded than came.
     """
+    scenario = file.scenario
     testers = zip(scenario.walks, day.testers, strict=True)
     return (
         *(_tester(plan, log, scenario.record) for plan, log in testers),
         *_surveyors(scenario, stage),
-        *_shoppers(scenario, day, seed),
+        *_shoppers(file, day, seed),
     )
 
 
@@ -93,7 +96,6 @@ def _visits(stage: Stage, day: Day) -> Visits:
 
 def _tester(plan: WalkPlan, log: WalkLog, record: Record) -> Carrier:
     trajectory = log.trajectory()
-    start_us = int(trajectory.time_us[0])
     return Carrier(
         name=plan.name,
         phone=plan.phone,
@@ -101,12 +103,17 @@ def _tester(plan: WalkPlan, log: WalkLog, record: Record) -> Carrier:
         split=plan.split,
         trajectory=trajectory,
         marks=log.pressed(),
-        carrying=Carrying(
-            time_us=np.array([start_us + to_us(each.after_s) for each in plan.carrying]),
-            carrying=np.array([_CARRYING[each.carrying] for each in plan.carrying]),
-        ),
+        carrying=_carrying(plan.carrying, trajectory),
         gait=plan.gait,
         record=record,
+    )
+
+
+def _carrying(told: Sequence[CarriedFrom], trajectory: Trajectory) -> Carrying:
+    start_us = int(trajectory.time_us[0])
+    return Carrying(
+        time_us=np.array([start_us + to_us(each.after_s) for each in told]),
+        carrying=np.array([_CARRYING[each.carrying] for each in told]),
     )
 
 
@@ -120,15 +127,13 @@ def _surveyors(scenario: Scenario, stage: Stage) -> Iterator[Carrier]:
             split=plan.split,
             trajectory=trajectory,
             marks=marks,
-            carrying=Carrying(
-                time_us=trajectory.time_us[:1], carrying=np.array([_CARRYING["hand"]])
-            ),
+            carrying=_carrying(plan.carrying, trajectory),
             gait=Gait(),
             record=scenario.record,
         )
 
 
-def _shoppers(scenario: Scenario, day: Day, seed: int) -> Iterator[Carrier]:
+def _shoppers(file: ScenarioFile, day: Day, seed: int) -> Iterator[Carrier]:
     """Shoppers drawn by lot; a lot goes with a name, so that more shoppers change few of them."""
     shoppers = [person for person in day.people if person.role == "shopper"]
     lots = [
@@ -136,13 +141,15 @@ def _shoppers(scenario: Scenario, day: Day, seed: int) -> Iterator[Carrier]:
         for each in shoppers
     ]
     drawn = iter(np.argsort([lot[0, 0] for lot in lots], kind="stable").tolist())
-    wanted = sum(phones.count for phones in scenario.shopper_phones)
+    told = file.scenario.shopper_phones
+    wanted = sum(phones.count for phones in told)
     if wanted > len(shoppers):
-        raise ScenarioError(
-            f"shopper_phones: {wanted} phones are to be recorded, but {len(shoppers)} shoppers"
-            " came; record fewer or let more come"
+        reason = (
+            f"{wanted} phones are to be recorded, but {len(shoppers)} shoppers came; record fewer"
+            " or let more come"
         )
-    for phones in scenario.shopper_phones:
+        raise ScenarioError(file.fault(["shopper_phones"], reason))
+    for phones in told:
         chosen = sorted(next(drawn) for _ in range(phones.count))
         yield from (_shopper(shoppers[row], phones) for row in chosen)
 

@@ -80,7 +80,7 @@ class Simulation:
         refuse_bad_seed(seed)
         stage = set_stage(file, seed)
         day = everybody_in(stage, seed, progress)
-        carriers = carriers_of(file.scenario, stage, day, seed)
+        carriers = carriers_of(file, stage, day, seed)
         crowd = crowd_of(stage, day)
         walked = [*(each.trajectory for each in carriers), *(p.trajectory for p in crowd.people)]
         until_us = 1 + max(int(trajectory.time_us[-1]) for trajectory in walked)

@@ -14,6 +14,8 @@ from blesim.errors import DataError, VenueError
 from blesim.recording import SCHEMA_VERSION
 from blesim.whole_file import whole_file, write_all, written
 
+AnyPath = str | os.PathLike[str]
+
 RECORDING = "recording"
 TRACKS = "tracks"
 # Few chunks, so that each is still in the processor's cache when its turn to be compressed comes.
@@ -110,7 +112,7 @@ class Draft:
 
 
 @contextmanager
-def created(path: Path) -> Iterator[Draft]:
+def created(path: AnyPath) -> Iterator[Draft]:
     """An empty HDF5 file that appears under its name when the block ends well, or never.
 
     Raises
@@ -120,6 +122,7 @@ def created(path: Path) -> Iterator[Draft]:
     DataError
         If the disk is full or fails.
     """
+    path = Path(path)
     with whole_file(path) as raw:
         disk = Disk(raw)
         # No time stamps anywhere: the same content must give the same bytes.
@@ -140,12 +143,12 @@ def created(path: Path) -> Iterator[Draft]:
 
 
 @contextmanager
-def opened(path: Path, content: str) -> Iterator[h5py.File]:
+def opened(path: AnyPath, content: str) -> Iterator[h5py.File]:
     """A file of ours, open for reading; whatever is wrong with it is one line that names it.
 
     Parameters
     ----------
-    path : Path
+    path : path-like
         The file.
     content : str
         `RECORDING` or `TRACKS`.
@@ -155,6 +158,7 @@ def opened(path: Path, content: str) -> Iterator[h5py.File]:
     DataError
         If it is missing, damaged, not ours, or made by another version.
     """
+    path = Path(path)
     try:
         with _open(path) as file:
             _refuse_foreign(file, content)
@@ -184,10 +188,18 @@ def _refuse_foreign(file: h5py.File, content: str) -> None:
     if found != content:
         raise DataError(f"holds {found}, not {content}; give the other file")
     if version != SCHEMA_VERSION:
-        raise DataError(
-            f"schema version {version}, but this blesim reads {SCHEMA_VERSION};"
-            " use the blesim that wrote it, or a newer one"
-        )
+        ours = f"schema version {version}, but this blesim reads {SCHEMA_VERSION}"
+        raise DataError(f"{ours}; {_what_to_do(version)}")
+
+
+def _what_to_do(version: str) -> str:
+    if _numbers(version) > _numbers(SCHEMA_VERSION):
+        return "use a newer blesim"
+    return "make the file again, or use the blesim that wrote it"
+
+
+def _numbers(version: str) -> list[int]:
+    return [int(part) if part.isdecimal() else 0 for part in version.split(".")]
 
 
 def first_line(fault: BaseException) -> str:

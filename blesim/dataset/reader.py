@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
@@ -19,7 +18,7 @@ from blesim.dataset.columns_in import (
     read_text,
     read_texts,
 )
-from blesim.dataset.files import RECORDING, opened
+from blesim.dataset.files import RECORDING, AnyPath, opened
 from blesim.dataset.provenance import read_provenance
 from blesim.errors import DataError
 from blesim.recording import (
@@ -49,12 +48,12 @@ AnyTable = TypeVar("AnyTable", bound=Table)
 _OBSERVED = [type(table) for table in Observations().tables()]
 
 
-def read_recording(path: Path) -> Recording:
+def read_recording(path: AnyPath) -> Recording:
     """What phones observed; the truth in the same file is not touched.
 
     Parameters
     ----------
-    path : Path
+    path : path-like
         A recording that `RecordingWriter` wrote.
 
     Returns
@@ -75,7 +74,7 @@ def read_recording(path: Path) -> Recording:
         )
 
 
-def read_truth(path: Path) -> Truth:
+def read_truth(path: AnyPath) -> Truth:
     """What really happened on the walks of a recording.
 
     Raises
@@ -112,7 +111,7 @@ def read_truth(path: Path) -> Truth:
         )
 
 
-def read_crowd(path: Path) -> Crowd:
+def read_crowd(path: AnyPath) -> Crowd:
     """Everybody who was in the venue; nobody where only the recorded walks are known.
 
     Raises

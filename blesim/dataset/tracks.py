@@ -8,7 +8,7 @@ from types import MappingProxyType
 
 from blesim import columns
 from blesim.dataset.columns_in import read_texts
-from blesim.dataset.files import TRACKS, created, opened
+from blesim.dataset.files import TRACKS, AnyPath, created, opened
 from blesim.dataset.layout import write_table
 from blesim.dataset.provenance import packages, read_root, write_root
 from blesim.dataset.reader import read_tables
@@ -41,12 +41,12 @@ class TrackSet:
         return tuple(dict.fromkeys(label for label, _ in self.runs))
 
 
-def write_tracks(path: Path, tracks: TrackSet) -> None:
+def write_tracks(path: AnyPath, tracks: TrackSet) -> None:
     """Tracks in a file: one row of ``/runs`` a try, all estimates in ``/track``.
 
     Parameters
     ----------
-    path : Path
+    path : path-like
         The file; one that is already there is replaced when the new one is whole.
     tracks : TrackSet
         What to write.
@@ -78,7 +78,7 @@ def _reason(failure: Failure) -> str:
     return failure.reason or "no reason given"
 
 
-def read_tracks(path: Path) -> TrackSet:
+def read_tracks(path: AnyPath) -> TrackSet:
     """Tracks out of a file that `write_tracks` wrote.
 
     Raises
@@ -101,7 +101,7 @@ def read_tracks(path: Path) -> TrackSet:
         )
 
 
-def sha256_of(path: Path) -> str:
+def sha256_of(path: AnyPath) -> str:
     """SHA-256 of a file's bytes, in hexadecimal.
 
     Raises
@@ -110,7 +110,7 @@ def sha256_of(path: Path) -> str:
         If the file cannot be read.
     """
     try:
-        with path.open("rb") as file:
+        with Path(path).open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as fault:
         raise DataError(f"{path}: cannot be read: {fault.strerror}") from fault

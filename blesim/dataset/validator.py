@@ -1,7 +1,6 @@
 """What is wrong with a recording, fault by fault, measured against `columns.py`."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -18,7 +17,7 @@ from blesim.dataset.columns_in import (
     read_text,
     read_texts,
 )
-from blesim.dataset.files import DAMAGE, RECORDING, first_line, opened
+from blesim.dataset.files import DAMAGE, RECORDING, AnyPath, first_line, opened
 from blesim.dataset.layout import (
     CONVENTIONS,
     RECORDED,
@@ -30,6 +29,7 @@ from blesim.dataset.layout import (
 )
 from blesim.dataset.provenance import read_provenance
 from blesim.dataset.static_tables import venue_tables
+from blesim.dataset.true_places import place_faults, twice_told_faults, visit_faults
 from blesim.errors import DataError, VenueError
 from blesim.venue.geojson import from_geojson
 from blesim.venue.venue import Venue
@@ -37,12 +37,12 @@ from blesim.venue.venue import Venue
 Attributes = dict[str, str | NDArray[Any]]
 
 
-def validate(path: Path) -> list[str]:
+def validate(path: AnyPath) -> list[str]:
     """Everything wrong with a recording, one line a fault; nothing if it is valid.
 
     Parameters
     ----------
-    path : Path
+    path : path-like
         The recording.
 
     Raises
@@ -151,7 +151,8 @@ def _range(name: str, column: Column, values: NDArray[Any]) -> Iterator[str]:
 
 
 def _contents(file: h5py.File) -> Iterator[str]:
-    yield from _map_tables(file, _venue(file, "surveyed"))
+    surveyed, built = _venue(file, "surveyed"), _venue(file, "built")
+    yield from _map_tables(file, surveyed)
     yield from _names(file)
     starts: dict[str, NDArray[np.int64]] = {}
     counted = [(columns.WALKS, stream) for stream in RECORDED]
@@ -167,9 +168,16 @@ def _contents(file: h5py.File) -> Iterator[str]:
         if row is not None:
             yield f"{stream.group}/time goes backwards at row {row}"
     yield from _history(file)
-    yield from _rows(file)
+    dangling = list(_rows(file, surveyed, built))
+    yield from dangling
+    if not dangling:
+        yield from place_faults(file, surveyed, built)
     if starts.keys() >= {stream.group for stream in RECORDED}:
         yield from _coverage(file, starts)
+    if not dangling and starts.keys() >= {columns.CROWD.group}:
+        yield from visit_faults(file, starts)
+    if starts.keys() >= {columns.TRAJECTORY.group, columns.CROWD.group}:
+        yield from twice_told_faults(file, starts)
 
 
 def _map_tables(file: h5py.File, venue: Venue) -> Iterator[str]:
@@ -210,9 +218,8 @@ def _names(file: h5py.File) -> Iterator[str]:
             yield f"{stream.group}/{column.name}: two {row} have the same name"
 
 
-def _rows(file: h5py.File) -> Iterator[str]:
+def _rows(file: h5py.File, surveyed: Venue, built: Venue) -> Iterator[str]:
     """Yield the columns that point at rows which the table they point at does not have."""
-    surveyed, built = _venue(file, "surveyed"), _venue(file, "built")
     edges = 0 if built.graph is None else len(built.graph.edges)
     people = len(read_texts(file, columns.PEOPLE, columns.PEOPLE.columns[0]))
     for stream, name, rows in (

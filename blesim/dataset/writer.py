@@ -2,7 +2,6 @@
 
 from contextlib import ExitStack
 from dataclasses import replace
-from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from blesim import columns
 from blesim.columns import Stream
-from blesim.dataset.files import RECORDING, created
+from blesim.dataset.files import RECORDING, AnyPath, created
 from blesim.dataset.layout import (
     CHUNK_ROWS,
     RECORDED,
@@ -85,7 +84,7 @@ class RecordingWriter:
 
     Parameters
     ----------
-    path : Path
+    path : path-like
         The file; one that is already there is replaced when the new one is whole.
     venue_surveyed, venue_built : Venue
         As an estimator may know it, and as it really is.
@@ -106,7 +105,7 @@ class RecordingWriter:
 
     def __init__(
         self,
-        path: Path,
+        path: AnyPath,
         *,
         venue_surveyed: Venue,
         venue_built: Venue,
@@ -210,12 +209,12 @@ def _values(table: Table) -> list[list[Any]]:
     return [values.tolist() for values in table.arrays()]
 
 
-def write_recording(path: Path, recording: Recording, truth: Truth | None = None) -> None:
+def write_recording(path: AnyPath, recording: Recording, truth: Truth | None = None) -> None:
     """A whole recording in a file; see `RecordingWriter` for how and for what is raised.
 
     Parameters
     ----------
-    path : Path
+    path : path-like
         The file.
     recording : Recording
         What phones observed.

@@ -1,6 +1,6 @@
 """The picture of a day: how full the venue was, and where in it people spent their time."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
 import shapely
@@ -13,6 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
+from blesim.columns import NO_EDGE
 from blesim.metrics.presence import most_present, occupancy, presence_h
 from blesim.recording import Crowd, Person, Role
 from blesim.report.colours import COLOURS
@@ -55,14 +56,15 @@ def draw_day(venue: Venue, crowd: Crowd) -> Figure:
         One floor plan for each level that has sections or people.
     """
     figure, plans = _drawn_plans(venue, crowd, with_chart=True)
-    plans[0].set_title(
-        "presence by section" if venue.sections else "floor plan, without sections", loc="left"
-    )
+    title = "presence by section" if _shows_presence(venue, crowd) else "floor plan"
+    plans[0].set_title(title if venue.sections else "floor plan, without sections", loc="left")
     return figure
 
 
 def draw_walks(venue: Venue, walks: Mapping[str, Trajectory]) -> Figure:
     """A figure of recorded walks over the floor plan, and of presence by section.
+
+    Walks that tell no edge, such as surveys, are drawn, but not counted; the title says so.
 
     Parameters
     ----------
@@ -80,9 +82,27 @@ def draw_walks(venue: Venue, walks: Mapping[str, Trajectory]) -> Figure:
     figure, plans = _drawn_plans(venue, Crowd(people=tuple(people)), with_chart=False)
     for axes, level in zip(plans, _levels(venue, walks.values()), strict=True):
         _draw_ways(axes, walks.values(), level)
-    title = f"{len(walks)} recorded walks" if len(walks) != 1 else "1 recorded walk"
-    plans[0].set_title(title + (" and presence by section" if venue.sections else ""), loc="left")
+    plans[0].set_title(_walks_title(venue, walks.values()), loc="left")
     return figure
+
+
+def _walks_title(venue: Venue, walked: Collection[Trajectory]) -> str:
+    title = f"{len(walked)} recorded walks" if len(walked) != 1 else "1 recorded walk"
+    counted = sum(_tells_edges(way) for way in walked)
+    if not venue.sections or not counted:
+        return title
+    of_some = f" of the {counted} on aisles" if counted < len(walked) else ""
+    return f"{title} and presence by section{of_some}"
+
+
+def _shows_presence(venue: Venue, crowd: Crowd) -> bool:
+    """Whether presence can be told: there are sections, and not all people are off the aisles."""
+    ways = [person.trajectory for person in crowd.people]
+    return bool(venue.sections) and (not ways or any(map(_tells_edges, ways)))
+
+
+def _tells_edges(way: Trajectory) -> bool:
+    return bool(np.any(way.edge != NO_EDGE))
 
 
 def _drawn_plans(venue: Venue, crowd: Crowd, *, with_chart: bool) -> tuple[Figure, list[Axes]]:
@@ -168,7 +188,7 @@ def _draw_heat(
     crowd: Crowd,
 ) -> None:
     """Draw each section as a strip along its aisle in the colour of its presence."""
-    if venue.graph is None or not venue.sections:
+    if venue.graph is None or not _shows_presence(venue, crowd):
         return
     spent_h = presence_h(crowd, venue)
     places = SectionPlaces.of(venue.graph, venue.sections)

@@ -1,32 +1,31 @@
 """From what a scenario says to what happens: who walks and surveys, and whether it connects."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import shapely
 
 from blesim.errors import BlesimError, ScenarioError, VenueError
 from blesim.radio.beacon_events import Moves, impossible_events, in_order
 from blesim.recording import ALL_WALKS
 from blesim.scenario.reading import ScenarioFile
+from blesim.scenario.shop_day import ShopDay
+from blesim.scenario.survey_built import LATEST_END_S, planned_surveys
 from blesim.scenario.survey_plan import SurveyPlan
 from blesim.scenario.venue_built import built_venue, surveyed_venue
 from blesim.scenario.walk_plan import RouteStop, WalkPlan
-from blesim.units import wrap_angle
 from blesim.venue.graph import AisleGraph, GraphPosition, Leg
 from blesim.venue.venue import Venue
 from blesim.walkers.faults import faults as day_faults
 from blesim.walkers.itinerary import Itinerary, Stop, WayPoints, way_points
-from blesim.walkers.shopping import read_lists, read_routes
-from blesim.walkers.survey import SpotSurvey, grid_spots_m
+from blesim.walkers.shopping_files import read_lists, read_routes
+from blesim.walkers.survey import SpotSurvey
 from blesim.walkers.trading_day import TradingDay
 
 _OFF_AISLE_M = 0.5
-_LATEST_END_S = 31 * 86400.0
 # What simulated people are called.
 _TAKEN = ("shopper-", "replayed-", "staff-")
 
@@ -68,13 +67,11 @@ def set_stage(file: ScenarioFile, seed: int) -> Stage:
     if graph is None and (scenario.walks or scenario.trading_day is not None):
         raise ScenarioError(file.fault(["venue"], "the map has no aisle graph to walk on"))
     faults = [*_name_faults(file), *_phone_faults(file), *_event_faults(file, built)]
-    surveys, day = [], _day(file, built, faults)
+    day = _day(file, built, faults)
     itineraries: list[Itinerary] = []
     if graph is not None:
         itineraries = _itineraries(file, built, graph, faults)
-    for row, survey in enumerate(scenario.surveys):
-        surveys.append(_survey(survey, built))
-        faults += [file.fault(["surveys", row], each) for each in _spot_faults(survey, built)]
+    surveys = planned_surveys(file, built, faults)
     if faults:
         raise ScenarioError("\n".join(faults))
     return Stage(
@@ -82,7 +79,7 @@ def set_stage(file: ScenarioFile, seed: int) -> Stage:
         surveyed=surveyed_venue(built, scenario.venue, seed),
         graph=graph,
         itineraries=tuple(itineraries),
-        surveys=tuple(surveys),
+        surveys=surveys,
         day=day,
     )
 
@@ -119,35 +116,19 @@ def _day(file: ScenarioFile, built: Venue, faults: list[str]) -> TradingDay | No
             faults.append(file.fault(["trading_day", f"{key}_file"], str(error)))
     day = told.model_copy(update=content)
     found = day_faults(day, built) if built.graph is not None else []
-    faults += [file.fault(["trading_day", *location], message) for location, message in found]
+    faults += [
+        file.fault(["trading_day", *_where_told(location, told)], message)
+        for location, message in found
+    ]
     return day
 
 
-def _survey(plan: SurveyPlan, built: Venue) -> SpotSurvey:
-    spots_m = np.array([(spot.x_m, spot.y_m) for spot in plan.spots]).reshape(-1, 2)
-    if plan.grid_m is not None and plan.level in built.floor_plan.walkable:
-        spots_m = grid_spots_m(built.floor_plan, plan.level, plan.grid_m)
-    return SpotSurvey(
-        spots_m=spots_m,
-        level=plan.level,
-        headings_rad=tuple(float(wrap_angle(np.radians(deg))) for deg in plan.directions_deg),
-        stand_s=plan.stand_s,
-        speed_m_s=plan.speed_m_s,
-        turn_rate_rad_s=float(np.radians(plan.turn_rate_deg_s)),
-        start_s=plan.start_s,
-    )
-
-
-def _spot_faults(plan: SurveyPlan, built: Venue) -> Iterator[str]:
-    free = built.floor_plan.walkable.get(plan.level)
-    if free is None:
-        yield f"the map has no level {plan.level}"
-        return
-    if plan.grid_m is not None and not len(grid_spots_m(built.floor_plan, plan.level, plan.grid_m)):
-        yield f"no crossing of a grid of {plan.grid_m:g} m is walkable; make it narrower"
-    for spot in plan.spots:
-        if not shapely.covers(free, shapely.Point(spot.x_m, spot.y_m)):
-            yield f"({spot.x_m:g}, {spot.y_m:g}) is not walkable: inside a shelf, or out of bounds"
+def _where_told(location: tuple[str | int, ...], told: ShopDay) -> tuple[str | int, ...]:
+    """Where a part of the day stands: lists and routes after the scenario's own are in its file."""
+    for key, own in (("lists", told.lists), ("routes", told.routes)):
+        if location[:1] == (key,) and len(location) > 1 and int(location[1]) >= len(own):
+            return (f"{key}_file",)
+    return location
 
 
 def _name_faults(file: ScenarioFile) -> list[str]:
@@ -243,9 +224,9 @@ def _way_faults(
         except VenueError as error:
             faults.append(file.fault(["walks", row, "route", number], str(error)))
     ends_s = _latest_end_s(file.scenario.walks[row], legs)
-    if ends_s > _LATEST_END_S:
+    if ends_s > LATEST_END_S:
         reason = (
-            f"may go on until {ends_s:.0f} s, and {_LATEST_END_S:.0f} s (31 days) is the most;"
+            f"may go on until {ends_s:.0f} s, and {LATEST_END_S:.0f} s (31 days) is the most;"
             " cut it into walks"
         )
         faults.append(file.fault(["walks", row], reason))
@@ -266,5 +247,11 @@ def _itinerary(plan: WalkPlan, stops: tuple[Stop, ...], venue: Venue) -> Itinera
         start_s=plan.start_s,
         speed_m_s=plan.speed_m_s,
         turn_rate_rad_s=float(np.radians(plan.turn_rate_deg_s)),
-        way_points=way_points(venue) if plan.marks == "way-points" else WayPoints(),
+        way_points=_way_points(plan, stops, venue),
     )
+
+
+def _way_points(plan: WalkPlan, stops: tuple[Stop, ...], venue: Venue) -> WayPoints:
+    if plan.marks == "none":
+        return WayPoints()
+    return way_points(venue, stops if plan.marks == "stops" else ())

@@ -1,6 +1,7 @@
 """Reading a scenario: YAML into models, and every fault with its file and line."""
 
 import json
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,6 +14,14 @@ from blesim.errors import ScenarioError
 from blesim.scenario.document import Document, read_document
 from blesim.scenario.model import Scenario
 from blesim.settings import shortened
+
+_FIRST_WORD = re.compile(r"(\w+)(?:: | (?='))")
+# Where pydantic speaks of Python and of JSON, a scenario has lists and mappings.
+_COUNTS = {"too_short": "min_length", "too_long": "max_length"}
+_SHAPES = {
+    **dict.fromkeys(("model_type", "dict_type"), "give a mapping"),
+    **dict.fromkeys(("tuple_type", "list_type"), "give a list"),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,10 +104,20 @@ def _checked(document: Document) -> Scenario:
         return Scenario.model_validate_json(json.dumps(document.value))
     except ValidationError as error:
         faults = [
-            document.fault(fault["loc"], _reason(dict(fault)))
+            document.fault(*_at_its_key(fault["loc"], _reason(dict(fault)), fault.get("input")))
             for fault in error.errors(include_url=False)
         ]
         raise ScenarioError("\n".join(faults)) from None
+
+
+def _at_its_key(
+    location: Sequence[str | int], reason: str, value: Any
+) -> tuple[Sequence[str | int], str]:
+    """A fault of a mapping whose reason begins with one of its keys, told at that key."""
+    key = _FIRST_WORD.match(reason)
+    if key is None or not isinstance(value, dict) or key[1] not in value:
+        return location, reason
+    return [*location, key[1]], reason[key.end() :]
 
 
 def _reason(fault: dict[str, Any]) -> str:
@@ -113,7 +132,11 @@ def _reason(fault: dict[str, Any]) -> str:
     if kind == "union_tag_invalid":
         tag = shortened(fault["ctx"]["tag"])
         return f"unknown '{tag}'; use one of {fault['ctx']['expected_tags']}"
-    message = str(fault["msg"]).removeprefix("Value error, ")
+    if kind in _COUNTS and isinstance(value, dict | list):
+        least_or_most = fault["ctx"][_COUNTS[kind]]
+        words = "at least" if kind == "too_short" else "at most"
+        return f"give {words} {least_or_most}, not {fault['ctx']['actual_length']}"
+    message = _SHAPES.get(kind) or str(fault["msg"]).removeprefix("Value error, ")
     if isinstance(value, dict | list):
         return message
     return f"{message}, not {shortened(json.dumps(value))}"

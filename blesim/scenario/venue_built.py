@@ -1,5 +1,9 @@
 """The venue of a scenario: as built, and as the installer wrote it down."""
 
+from collections.abc import Callable, Mapping
+from functools import partial
+from types import MappingProxyType
+
 import numpy as np
 import shapely
 from shapely.ops import nearest_points
@@ -7,13 +11,30 @@ from shapely.ops import nearest_points
 from blesim.errors import BlesimError, ScenarioError
 from blesim.rng import Draws
 from blesim.scenario.reading import ScenarioFile
-from blesim.scenario.venue_source import VenueSource
+from blesim.scenario.venue_source import LayoutName, VenueSource
 from blesim.venue.beacons import Beacon
 from blesim.venue.geojson import from_geojson
 from blesim.venue.layouts import wholesale_section, wholesale_store
+from blesim.venue.sites.campus_corridor import campus_corridor, campus_corridor_keys
+from blesim.venue.sites.h_floor import h_floor
+from blesim.venue.sites.office import office_dense, office_sparse
+from blesim.venue.sites.two_pair_room import two_pair_room
 from blesim.venue.venue import Venue
 
-_LAYOUTS = {"wholesale-section": wholesale_section, "wholesale-store": wholesale_store}
+LAYOUTS: Mapping[LayoutName, Callable[[], Venue]] = MappingProxyType(
+    {
+        "wholesale-section": wholesale_section,
+        "wholesale-store": wholesale_store,
+        "room-two-pairs": two_pair_room,
+        "campus-corridor": campus_corridor,
+        "campus-corridor-15": partial(campus_corridor, 15),
+        "campus-corridor-10": partial(campus_corridor, 10),
+        "campus-corridor-keys": campus_corridor_keys,
+        "office-dense": office_dense,
+        "office-sparse": office_sparse,
+        "h-floor": h_floor,
+    }
+)
 
 
 def built_venue(file: ScenarioFile) -> Venue:
@@ -26,7 +47,7 @@ def built_venue(file: ScenarioFile) -> Venue:
     """
     source = file.scenario.venue
     if source.layout is not None:
-        return _LAYOUTS[source.layout]()
+        return LAYOUTS[source.layout]()
     map_path = file.path.parent / str(source.map)
     try:
         return from_geojson(map_path.read_text(encoding="utf-8-sig"), str(map_path))

@@ -1,28 +1,20 @@
 """A scripted walk as a scenario tells it: route, pace, and how the phone is carried."""
 
-from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import (
-    BeforeValidator,
-    Field,
-    GetJsonSchemaHandler,
-    WithJsonSchema,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from blesim.columns import LONGEST_STEP_M
 from blesim.scenario.at_least import AtLeast
+from blesim.scenario.carried import IN_HAND, Carried
 from blesim.settings import LevelNumber, MapCoordinate, Name, Settings, Text
 from blesim.walkers.gait import Gait
 
 # On average: shorter ones would be hundreds of steps a metre.
 _SHORTEST_STEP_M = 0.1
-CarryingName = Literal["hand", "flat", "swinging", "pocket", "bag", "trolley"]
 
 
 class RouteStop(Settings):
@@ -68,38 +60,6 @@ class RouteStop(Settings):
         return self
 
 
-class CarriedFrom(Settings):
-    """A way of carrying the phone, from some time of the walk on.
-
-    Attributes
-    ----------
-    carrying : str
-        ``hand``: in front of the body; ``flat``: held level there; ``swinging``: in the hand of a
-        swinging arm; ``pocket``; ``bag``; ``trolley``.
-    after_s : float
-        How long after the start of the walk. [s]
-    """
-
-    carrying: CarryingName
-    after_s: float = Field(default=0.0, ge=0, le=31 * 86400)
-
-
-def _throughout(value: Any) -> Any:
-    """A way of carrying that is given by its name holds from the start on."""
-    if isinstance(value, str):
-        return ({"carrying": value},)
-    # What comes out of a validator of ours no longer counts as JSON, which has no tuples.
-    return tuple(value) if isinstance(value, list) else value
-
-
-_CARRYING_SCHEMA = {
-    "anyOf": [
-        {"type": "string", "enum": ["hand", "flat", "swinging", "pocket", "bag", "trolley"]},
-        {"type": "array", "minItems": 1, "items": CarriedFrom.model_json_schema()},
-    ]
-}
-
-
 class WalkPlan(Settings):
     """One walk of one phone along a route.
 
@@ -126,32 +86,22 @@ class WalkPlan(Settings):
         How the walker steps.
     marks : str
         ``way-points``: the tester presses at every end of a product section and every junction;
-        ``none``.
+        ``stops``: at every stop of the route, too; ``none``.
     route : tuple of RouteStop
         Stops in order, joined by the shortest way along the aisles.
     """
 
     name: Name
     phone: Name
-    carrying: Annotated[
-        tuple[CarriedFrom, ...], BeforeValidator(_throughout), WithJsonSchema(_CARRYING_SCHEMA)
-    ] = (CarriedFrom(carrying="hand"),)
+    carrying: Carried = IN_HAND
     kind: Literal["walk", "survey"] = "walk"
     split: Text = ""
     start_s: float = Field(default=0.0, ge=0, le=7 * 86400)
     speed_m_s: float = Field(default=1.0, ge=0.05, le=10)
     turn_rate_deg_s: float = Field(default=180.0, ge=1, le=3600)
     gait: Gait = Gait()
-    marks: Literal["way-points", "none"] = "way-points"
+    marks: Literal["way-points", "stops", "none"] = "way-points"
     route: Annotated[tuple[RouteStop, ...], AtLeast(2, "stops")]
-
-    @field_validator("carrying")
-    @classmethod
-    def _one_after_the_other(cls, carrying: tuple[CarriedFrom, ...]) -> tuple[CarriedFrom, ...]:
-        after_s = [each.after_s for each in carrying]
-        if not after_s or after_s[0] != 0 or any(b <= a for a, b in pairwise(after_s)):
-            raise ValueError("give at least one way, the first from 0 s on, each later than before")
-        return carrying
 
     @model_validator(mode="after")
     def _steps_are_possible(self) -> "WalkPlan":

@@ -172,8 +172,8 @@ def truth(recording: Recording, venue: Venue) -> Truth:
             power_change_db=[-3.0, 0.0, -3.0],
         ),
         crowd=Crowd(
-            people=(_person("Ana", Role.SHOPPER, 0), _person("Bo", Role.STAFF, 77)),
-            visits=Visits(time_us=[5, 9], person=[1, 0], section=[0, 0], dwell_us=[0, 3_000_000]),
+            people=(_person("Eva", Role.SHOPPER, 0), _person("Bo", Role.STAFF, 77)),
+            visits=Visits(time_us=[80, 90], person=[1, 0], section=[0, 0], dwell_us=[0, 3_000_000]),
         ),
     )
 

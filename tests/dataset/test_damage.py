@@ -86,7 +86,18 @@ def test_version_of_tomorrow(tmp_path: Path, whole: bytes, read: object) -> None
     path.write_bytes(whole)
     with h5py.File(path, "r+") as file:
         file.attrs["schema_version"] = "2.0"
-    assert "schema version 2.0, but this blesim reads 1.2" in _message(read, path)
+    says = "schema version 2.0, but this blesim reads 1.2; use a newer blesim"
+    assert _message(read, path).endswith(says)
+
+
+@pytest.mark.parametrize("version", ["1.1", "0.10", "one"])
+def test_version_of_yesterday(tmp_path: Path, whole: bytes, version: str) -> None:
+    path = tmp_path / "a.h5"
+    path.write_bytes(whole)
+    with h5py.File(path, "r+") as file:
+        file.attrs["schema_version"] = version
+    message = _message(read_recording, path)
+    assert message.endswith("; make the file again, or use the blesim that wrote it")
 
 
 @pytest.mark.parametrize("read", READERS)

@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 from blesim.columns import Column
 from blesim.dataset import layout, writer
-from blesim.dataset.reader import read_recording, read_truth
+from blesim.dataset.reader import read_crowd, read_recording, read_truth
 from blesim.dataset.validator import validate
 from blesim.dataset.writer import RecordingWriter, write_recording
 from blesim.errors import DataError, UsageError
@@ -27,6 +27,17 @@ def test_everything_comes_back(tmp_path: Path, recording: Recording, truth: Trut
     assert read_recording(tmp_path / "a.h5") == recording
     assert read_truth(tmp_path / "a.h5") == truth
     assert validate(tmp_path / "a.h5") == []
+
+
+def test_a_path_may_be_a_text(tmp_path: Path, recording: Recording, truth: Truth) -> None:
+    path = str(tmp_path / "a.h5")
+    write_recording(path, recording, truth)
+    assert read_recording(path) == recording
+    assert read_truth(path) == truth
+    assert read_crowd(path) == truth.crowd
+    assert validate(path) == []
+    with pytest.raises(DataError, match="there is no such file"):
+        read_recording(f"{path}.not")
 
 
 def test_same_input_same_bytes(tmp_path: Path, recording: Recording, truth: Truth) -> None:

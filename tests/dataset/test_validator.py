@@ -1,7 +1,9 @@
 """The validator finds each fault sown into a valid recording, and names it."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 import h5py
 import numpy as np
@@ -12,7 +14,8 @@ from blesim.dataset.reader import read_recording
 from blesim.dataset.validator import validate
 from blesim.dataset.writer import write_recording
 from blesim.errors import DataError
-from blesim.recording import Recording, Truth
+from blesim.recording import Person, Recording, Role, Truth, WalkTruth
+from blesim.tables import Trajectory, field_names
 
 Change = Callable[[h5py.File], None]
 
@@ -114,6 +117,48 @@ SOWN = {
         "walk 'radio map': /rssi reaches beyond its true trajectory",
     ),
 }
+# What can be in no venue, or contradicts itself.
+IMPOSSIBLE = {
+    "level of a walk": (
+        put("truth/trajectory/level", 1, 3),
+        "/truth/trajectory/level: 3 in row 1 is no level of the map",
+    ),
+    "level of a person": (
+        put("truth/crowd/level", 2, -1),
+        "/truth/crowd/level: -1 in row 2 is no level of the map",
+    ),
+    "level of a mark": (put("marks/level", 1, 9), "/marks/level: 9 in row 1 is no level"),
+    "level of a beacon": (
+        put("truth/beacon_events/level", 2, 9),
+        "/truth/beacon_events/level: 9 in row 2 is no level",
+    ),
+    "offset of a walk": (
+        put("truth/trajectory/offset", 1, 18.1),
+        "/truth/trajectory/offset: 18.1 in row 1, but edge 0 is 18 m long",
+    ),
+    "offset of a person": (
+        put("truth/crowd/offset", 0, -0.5),
+        "/truth/crowd/offset: -0.5 in row 0, but edge 0 is 18 m long",
+    ),
+    "place of a walk": (
+        put("truth/trajectory/x", 3, 21.5),
+        "/truth/trajectory: (21.5, 5) in row 3 is out of the bounds of level 0",
+    ),
+    "place of a person": (
+        put("truth/crowd/y", 2, -1.5),
+        "/truth/crowd: (1, -1.5) in row 2 is out of the bounds of level 0",
+    ),
+    "visit too early": (
+        put("truth/visits/time", 0, 76),
+        "/truth/visits: row 0 of 'Bo' begins before that person came",
+    ),
+    "visit too late": (
+        put("truth/visits/dwell", 1, 4_000_000),
+        "/truth/visits: row 1 of 'Eva' ends after that person left",
+    ),
+}
+
+
 # What a reader need not notice, since it looks at no attribute, no single value and no truth.
 UNREAD = {
     "half a graph",
@@ -184,6 +229,57 @@ def test_several_faults_are_told_at_once(path: Path) -> None:
         for name in ("units", "value", "nan", "title", "missing column"):
             SOWN[name][0](file)
     assert len(validate(path)) == 5
+
+
+@pytest.mark.parametrize("name", IMPOSSIBLE)
+def test_what_cannot_have_happened_is_one_line(path: Path, name: str) -> None:
+    change, expected = IMPOSSIBLE[name]
+    with h5py.File(path, "r+") as file:
+        change(file)
+    (fault,) = validate(path)
+    assert fault.startswith(expected)
+
+
+def test_a_step_over_the_bounds_or_the_end_of_an_edge_is_rounding(path: Path) -> None:
+    with h5py.File(path, "r+") as file:
+        file["truth/crowd/x"][0] = -0.9
+        file["truth/crowd/offset"][1] = 18.0005
+    assert validate(path) == []
+
+
+def retold(truth: Truth, change: Callable[[Trajectory], Trajectory]) -> Truth:
+    """The truth in which Ana, whose phone was recorded, is among everybody."""
+    walked = truth.walks["1"].trajectory
+    ana = Person(name="Ana", role=Role.TESTER, trajectory=change(walked))
+    walks = {name: told if name == "1" else WalkTruth() for name, told in truth.walks.items()}
+    crowd = replace(truth.crowd, people=(*truth.crowd.people, ana))
+    return replace(truth, walks=MappingProxyType(walks), crowd=crowd)
+
+
+def longer(way: Trajectory) -> Trajectory:
+    """The same walk, with some standing about after it."""
+    after = replace(way.rows(slice(1, 2)), time_us=way.time_us[1:] + 9)
+    told = {
+        name: np.concatenate([getattr(way, name), getattr(after, name)])
+        for name in field_names(Trajectory)
+    }
+    return Trajectory(**told)
+
+
+def test_a_walk_is_a_stretch_of_its_walkers_life(
+    tmp_path: Path, recording: Recording, truth: Truth
+) -> None:
+    for change in (lambda way: way, longer):
+        write_recording(tmp_path / "a.h5", recording, retold(truth, change))
+        assert validate(tmp_path / "a.h5") == []
+    for other in (
+        lambda way: replace(way, y_m=np.array([5.0, 5.01])),
+        lambda way: way.rows(slice(0, 1)),
+        lambda way: replace(way, time_us=way.time_us + 1),
+    ):
+        write_recording(tmp_path / "a.h5", recording, retold(truth, other))
+        (fault,) = validate(tmp_path / "a.h5")
+        assert fault == ("walk '1': /truth/trajectory differs from that of 'Ana' in /truth/crowd")
 
 
 def test_a_truth_with_nan_where_it_is_legal(path: Path) -> None:

@@ -7,6 +7,7 @@ import pytest
 import shapely
 from matplotlib.colors import to_rgba
 
+from blesim.columns import NO_EDGE
 from blesim.metrics.presence import presence_h
 from blesim.recording import Crowd, Person, Role
 from blesim.report.day_figure import draw_day, draw_walks
@@ -134,3 +135,24 @@ def test_any_name_can_be_drawn_and_the_bytes_repeat(section, crowd, tmp_path):
         save(draw_day(named, crowd), tmp_path / name)
     ElementTree.parse(tmp_path / "a.svg")
     assert (tmp_path / "a.svg").read_bytes() == (tmp_path / "b.svg").read_bytes()
+
+
+def off_the_aisles(way):
+    nowhere = np.full(len(way), np.nan)
+    edge = np.full(len(way), NO_EDGE)
+    return replace(way, edge=edge, offset_m=nowhere, edge_speed_m_s=nowhere)
+
+
+def test_presence_is_claimed_of_walks_on_aisles_alone(section):
+    walk = along(section, 1, 0, HOUR)
+    survey = off_the_aisles(walk)
+    plan, _ = draw_walks(section, {"a": walk, "s": survey}).axes
+    assert plan.get_title(loc="left") == (
+        "2 recorded walks and presence by section of the 1 on aisles"
+    )
+    (plan,) = draw_walks(section, {"s": survey}).axes
+    assert plan.get_title(loc="left") == "1 recorded walk"
+    assert len(plan.lines) == 1
+    lost = Crowd(people=(Person(name="a", role=Role.SHOPPER, trajectory=survey),))
+    _, plan = draw_day(section, lost).axes
+    assert plan.get_title(loc="left") == "floor plan"

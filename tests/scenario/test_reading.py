@@ -116,6 +116,8 @@ def test_changed_parameters_are_checked_and_told_in_the_text(scenario):
             "D1" + ", {node: D5, pause_s: 86400}" * 31,
             "scenario.yaml:7: walks.0: may go on until 26784",
         ),
+        ("phone: {}", "phone: 3", "scenario.yaml:5: phones.phone: give a mapping, not 3"),
+        ("  phone: {}", "  - phone", "scenario.yaml:4: phones: give a mapping"),
         ("layout: wholesale-section", 'map: "a\\0b"', "scenario.yaml:3: venue.map: holds the cont"),
     ],
 )
@@ -123,7 +125,7 @@ def test_a_fault_is_told_with_its_line(scenario, old, new, expected):
     assert old in GOOD
     (line,) = faults(scenario(GOOD.replace(old, new)))
     assert line.startswith(expected)
-    assert len(line) < 200
+    assert len(line) < 260
 
 
 @pytest.mark.parametrize(
@@ -331,3 +333,49 @@ def test_a_spoiled_line_never_escapes_as_anything_else(tmp_path_factory, line, v
     path.write_text("\n".join(lines), encoding="utf-8")
     with contextlib.suppress(ScenarioError):
         set_stage(read_scenario(path), 1)
+
+
+DAY = """\
+title: Day
+venue: {layout: wholesale-section}
+phones: {phone: {}}
+trading_day:
+  entrance: D/west
+  closes: "20:00"
+  group_shares: [1]
+  arrivals:
+    - {since: "08:00", weight: 1}
+  tills: {nodes: [F/west]}
+surveys:
+  - name: s
+    phone: phone
+    spots: [{x_m: 10, y_m: 13.5}]
+    directions_deg: [0]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "expected"),
+    [
+        ('"20:00"', '"07:00"', "6: trading_day.closes: '07:00' is not after opens '08:00'"),
+        ("[1]", "[0]", "7: trading_day.group_shares: every share is 0; give one"),
+        ("weight: 1", "weight: 0", "8: trading_day.arrivals: nobody would come while"),
+        ("[1]", "[]", "7: trading_day.group_shares: give at least 1, not 0"),
+        ("[1]", f"{[1] * 21}", "7: trading_day.group_shares: give at most 20, not 21"),
+        ("[1]", "1", "7: trading_day.group_shares: give a list, not 1"),
+        ("[0]", "[]", "15: surveys.0.directions_deg: give at least 1, not 0"),
+        ("{nodes: [F/west]}", "[F/west]", "10: trading_day.tills: give a mapping"),
+        ("trading_day:", "shopper_phones: []\nno_day:", "5: no_day: unknown key"),
+    ],
+)
+def test_a_fault_is_told_at_its_key_in_words_of_the_file(scenario, old, new, expected):
+    assert DAY.count(old) == 1
+    (line,) = faults(scenario(DAY.replace(old, new)))
+    assert line.startswith(f"scenario.yaml:{expected}")
+    assert "Tuple" not in line
+    assert "object" not in line
+
+
+def test_phones_of_shoppers_without_a_day_are_told_at_their_key(scenario):
+    (line,) = faults(scenario(GOOD + "shopper_phones: [{phone: phone, count: 1}]\n"))
+    assert line.startswith("scenario.yaml:11: shopper_phones: there are no shoppers")

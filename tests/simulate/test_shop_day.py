@@ -146,7 +146,7 @@ def test_more_recorded_phones_leave_the_others_as_they_were(recorded, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [
-        ('closes: "09:20"', 'closes: "08:20"', ":4: trading_day: closes '08:20' is not after"),
+        ('closes: "09:20"', 'closes: "08:20"', ":6: trading_day.closes: '08:20' is not after"),
         ("nodes: [F/west]", "nodes: [F/moon]", ":9: trading_day.tills.nodes.0:"),
         ("nodes: [F/west]", "nodes: []", ":9: trading_day.tills.nodes:"),
         ("nodes: [F/west],", "nodes: [F/west], servers: 0,", ":9: trading_day.tills.servers:"),
@@ -165,9 +165,8 @@ def test_a_wrong_day_is_told_with_its_line(tmp_path, old, new, expected):
 
 
 def test_more_phones_than_shoppers_are_refused(tmp_path):
-    with pytest.raises(
-        ScenarioError, match=r"2004 phones are to be recorded, but \d+ shoppers came"
-    ):
+    says = r"yaml:13: shopper_phones: 2004 phones are to be recorded, but \d+ shoppers came"
+    with pytest.raises(ScenarioError, match=says):
         run(tmp_path, DAY.replace("count: 4", "count: 2003"))
 
 
@@ -192,6 +191,34 @@ def test_lists_and_routes_come_from_files_beside_the_scenario(tmp_path):
     truth = run(tmp_path, text).recording()[1]
     visited = {truth.venue.sections[row].id for row in truth.crowd.visits.section}
     assert visited == {"D-03", "E-07"}
+
+
+@pytest.mark.parametrize(
+    ("key", "rows", "expected"),
+    [
+        ("lists", "shopper,section\nann,D-03\nann,moon\n", "list of 'ann': there is no section"),
+        ("routes", "shopper,time_s,node\nann,1,moon\n", "route of 'ann': there is neither"),
+        ("lists", "shopper,section\nann,D\x0703\n", "{path}:2: section: holds the control"),
+    ],
+)
+def test_a_wrong_row_of_a_file_is_told_where_the_file_is_named(tmp_path, key, rows, expected):
+    path = tmp_path / "rows.csv"
+    path.write_text(rows, encoding="utf-8")
+    own = "lists: [{shopper: bob, sections: [D-03]}]\n  "
+    text = DAY.replace("  staff: {number: 1}", f"  {own}{key}_file: rows.csv")
+    with pytest.raises(ScenarioError) as told:
+        run(tmp_path, text)
+    where = f"{tmp_path / 'scenario.yaml'}:13: trading_day.{key}_file: "
+    assert str(told.value).startswith(where + expected.format(path=path))
+    assert "\n" not in str(told.value)
+
+
+def test_a_file_without_a_name_is_refused(tmp_path):
+    text = DAY.replace("  staff: {number: 1}", '  lists_file: ""')
+    with pytest.raises(
+        ScenarioError, match=r":12: trading_day\.lists_file: .* is not a file; give"
+    ):
+        run(tmp_path, text)
 
 
 def test_a_survey_stands_at_its_spots(tmp_path):
@@ -219,6 +246,25 @@ surveys:
     path = tmp_path / "survey.h5"
     write_recording(path, recording, truth)
     assert validate(path) == []
+
+
+def test_a_surveyor_may_carry_the_phone_in_any_way(tmp_path):
+    text = """\
+title: Survey
+venue: {layout: wholesale-section}
+phones: {phone: {}}
+surveys:
+  - {name: hand, phone: phone, spots: [{x_m: 10, y_m: 13.5}]}
+  - {name: flat, phone: phone, spots: [{x_m: 10, y_m: 13.5}], start_s: 60, carrying: flat}
+  - name: both
+    phone: phone
+    start_s: 90
+    spots: [{x_m: 10, y_m: 13.5}]
+    carrying: [{carrying: hand}, {carrying: pocket, after_s: 4}]
+"""
+    recording, truth = run(tmp_path, text).recording()
+    assert [walk.carrying for walk in recording.walks] == ["hand", "flat", "hand, pocket"]
+    assert truth.walks["both"].carrying.time_us.tolist() == [90_000_000, 94_000_000]
 
 
 def test_a_survey_inside_a_shelf_is_refused(tmp_path):

@@ -1,0 +1,1 @@
+"""Parametric sites of the published experiments, each from the measures that its paper gives."""
