@@ -11,6 +11,7 @@ from blesim.cli.estimators import estimators
 from blesim.cli.fidelity import fidelity
 from blesim.cli.import_ import import_
 from blesim.cli.inspect import inspect
+from blesim.cli.rerun import rerun
 from blesim.cli.schema import schema
 from blesim.cli.score import score
 from blesim.cli.simulate import simulate
@@ -21,7 +22,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     add_completion=False,
 )
-for command in (simulate, estimate, score, inspect, validate, estimators, schema, fidelity):
+_COMMANDS = (simulate, estimate, score, inspect, validate, estimators, schema, fidelity, rerun)
+for command in _COMMANDS:
     app.command()(command)
 app.command(name="import")(import_)
 

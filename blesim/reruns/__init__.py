@@ -1,0 +1,1 @@
+"""Published experiments, rerun: one file a paper, its tables beside ours."""

@@ -1,0 +1,30 @@
+"""Experiments by the short names of their papers."""
+
+from importlib import import_module
+
+from blesim.errors import UsageError
+from blesim.reruns.base import Experiment
+
+# Imported only when asked for: each brings the simulator and its estimators.
+_MODULES = {
+    "aisle-graph": "aisle_graph",
+    "pdr-fingerprint": "pdr_fingerprint",
+    "map-ekf": "map_ekf",
+    "channel-ekf": "channel_ekf",
+    "proximity-pf": "proximity_pf",
+}
+PAPERS = tuple(_MODULES)
+
+
+def experiment_of(paper: str) -> Experiment:
+    """The experiment of a paper.
+
+    Raises
+    ------
+    UsageError
+        If there is none of that name.
+    """
+    if paper not in _MODULES:
+        raise UsageError(f"there is no paper '{paper}'; there is {', '.join(PAPERS)}, or all")
+    experiment: Experiment = import_module(f"blesim.reruns.{_MODULES[paper]}").EXPERIMENT
+    return experiment

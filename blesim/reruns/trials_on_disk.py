@@ -1,0 +1,67 @@
+"""Trials of experiments on disk: one small file a seed, so that a run resumes where it stopped."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from blesim.errors import DataError
+from blesim.reruns.base import Key
+from blesim.whole_file import write_whole
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrialStore:
+    """Where the trials of a run lie.
+
+    Attributes
+    ----------
+    folder : Path
+        Of the run.
+    version : str
+        What the numbers were made with; those of another version do not count.
+    """
+
+    folder: Path
+    version: str
+
+    def load(self, paper: str, seed: int) -> dict[Key, float] | None:
+        """Numbers of a trial; none if it has not been done with this version.
+
+        Raises
+        ------
+        DataError
+            If the file is damaged.
+        """
+        path = self._path(paper, seed)
+        try:
+            told = json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError) as fault:
+            raise DataError(f"{path}: damaged ({fault}); delete it to do it again") from fault
+        if told.get("version") != self.version:
+            return None
+        return {Key(*each["key"]): _number(each["value"]) for each in told["numbers"]}
+
+    def save(self, paper: str, seed: int, numbers: Mapping[Key, float]) -> None:
+        """Write the numbers of a trial, whole or not at all."""
+        path = self._path(paper, seed)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        told = {
+            "paper": paper,
+            "seed": seed,
+            "version": self.version,
+            "numbers": [
+                {"key": list(key), "value": value if value == value else None}
+                for key, value in numbers.items()
+            ],
+        }
+        write_whole(path, (json.dumps(told, indent=1) + "\n").encode())
+
+    def _path(self, paper: str, seed: int) -> Path:
+        return self.folder / "trials" / paper / f"seed-{seed:04d}.json"
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value
