@@ -37,7 +37,7 @@ _LEAST_VARIANCE_M2 = 0.1**2
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelEkf(EpochSettings):
-    """Channel-separate regression, fingerprints and EKF of [1]_: one estimate after every epoch.
+    """Channel-separate regression, fingerprints and EKF [1]_: one estimate after every epoch.
 
     Each channel of a beacon gives a distance by its polynomial, Eq 2, and each channel's radio map
     a position, Eq 10 to 15, and so a distance to every beacon heard, Eq 16. Of these up to six the

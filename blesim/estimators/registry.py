@@ -1,6 +1,7 @@
 """Estimators by name: the entry points of the group ``blesim.estimators``, ours and anybody's."""
 
 import difflib
+import re
 import typing
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, dataclass, fields, is_dataclass
@@ -13,6 +14,8 @@ from blesim.errors import UsageError
 from blesim.estimators.base import Estimator
 
 GROUP = "blesim.estimators"
+# A mark such as [1]_ points into documentation that a one-line summary leaves out.
+_REFERENCE = re.compile(r"\s*\[\d+\]_")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -128,7 +131,7 @@ def describe(name: str) -> Description:
         return Description(name=name, fault=f"'{name}' with default settings: {one_line(fault)}")
     return Description(
         name=name,
-        summary=(cls.__doc__ or "").strip().partition("\n")[0],
+        summary=_REFERENCE.sub("", (cls.__doc__ or "").strip().partition("\n")[0]),
         needs=tuple(sorted(str(need) for need in needs)),
         parameters=tuple(
             Parameter(name=key, type=_type_text(hint), default=_default_text(field))

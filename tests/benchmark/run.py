@@ -25,6 +25,7 @@ FILES = (
     "imu",
     "trading_day",
     "graph_filter",
+    "live_estimators",
 )
 OUTPUT = Path(__file__).resolve().parents[2] / "output" / "bench.json"
 
