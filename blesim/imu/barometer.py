@@ -6,7 +6,6 @@ from pydantic import Field
 
 from blesim.imu.carriage import HEIGHT, MODES
 from blesim.imu.drift import drift
-from blesim.imu.step_events import carried_as
 from blesim.rng import Draws
 from blesim.settings import Settings
 from blesim.tables import Carrying, Pressures, Trajectory
@@ -110,7 +109,7 @@ def pressure(
     period_us = MICROSECONDS_PER_SECOND / barometer.rate_hz
     count = int((end_us - start_us) / period_us + 1e-6) + 1
     time_us = start_us + np.rint(np.arange(count) * period_us).astype(np.int64)
-    height_m = MODES[carried_as(carrying, time_us), HEIGHT]
+    height_m = MODES[carrying.at(time_us), HEIGHT]
     altitude_m = barometer.altitude_m + height_m + _floor_m(trajectory, level_height_m, time_us)
     true_hpa = pressure_hpa(altitude_m, _weather_hpa(barometer, seed, time_us))
     once = Draws(seed=seed, purpose="pressure offset", walker=walker).normals(np.zeros(1, int))

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from blesim.columns import CARRYINGS
 from blesim.imu.drift import drift
-from blesim.imu.step_events import StepSensor, carried_as, stretch_biases_deg
+from blesim.imu.step_events import StepSensor, stretch_biases_deg
 from blesim.kernels import kernel
 from blesim.rng import Draws
 from blesim.settings import Settings
@@ -130,7 +130,7 @@ def _loose_deg(
     row = np.maximum(np.searchsorted(carrying.time_us, time_us, side="right") - 1, 0)
     draws = Draws(seed=seed, purpose="loose heading", walker=walker)
     angle_deg = heading.loose_deg * draws.normals(np.arange(len(carrying)))[:, 0]
-    return np.where(np.isin(carried_as(carrying, time_us), _LOOSE), angle_deg[row], 0.0)
+    return np.where(np.isin(carrying.at(time_us), _LOOSE), angle_deg[row], 0.0)
 
 
 @kernel

@@ -11,7 +11,7 @@ from blesim.columns import CARRYINGS, LONGEST_STEP_M
 from blesim.imu.compass import CompassErrors
 from blesim.rng import Draws
 from blesim.settings import Settings
-from blesim.tables import Carrying, IntArray, Steps, StepTruth
+from blesim.tables import Carrying, Steps, StepTruth
 from blesim.units import to_us, wrap_angle
 
 # Steps whose headings differ by less belong to the same straight stretch.
@@ -104,7 +104,7 @@ def read_steps(
     estimated = _estimated(truth, sensor, seed, walker)
     felt = _detected(truth, sensor, seed, walker)
     if carrying is not None:
-        felt &= carried_as(carrying, truth.time_us) != _TROLLEY
+        felt &= carrying.at(truth.time_us) != _TROLLEY
     extra_us, like = _extra(truth, sensor, carrying, seed, walker)
     rows = np.concatenate([np.flatnonzero(felt), like])
     happened_us = np.concatenate([truth.time_us[felt], extra_us])
@@ -152,12 +152,6 @@ def _stretch(heading_rad: NDArray[np.floating]) -> NDArray[np.int64]:
     """Number of the straight stretch each step belongs to, (n,)."""
     turned = np.abs(wrap_angle(np.diff(heading_rad))) > _SAME_STRETCH_RAD
     return np.concatenate([np.zeros(min(len(heading_rad), 1), int), np.cumsum(turned)])
-
-
-def carried_as(carrying: Carrying, time_us: IntArray) -> NDArray[np.int64]:
-    """How the phone is carried at some times, (n,): codes of `columns.CARRYINGS`."""
-    row = np.searchsorted(carrying.time_us, time_us, side="right") - 1
-    return np.asarray(carrying.carrying[np.maximum(row, 0)], dtype=np.int64)
 
 
 def _detected(truth: StepTruth, sensor: StepSensor, seed: int, walker: str) -> NDArray[np.bool_]:
