@@ -8,7 +8,7 @@ exact, and so rare that it may be slow.
 import numpy as np
 from numpy.typing import NDArray
 
-from blesim.filters.plan_grid import INSIDE, MIXED, OUTSIDE, REACH_M, Box
+from blesim.filters.plan_grid import INSIDE, MIXED, REACH_M, Box
 from blesim.filters.walls import ON_WALL_M, TOUCHES, contact, fill_cuts, on_wall
 from blesim.kernels import kernel
 
@@ -46,35 +46,6 @@ def fill_enterable(
 
 
 @kernel
-def fill_blocked(
-    x0: Array,
-    y0: Array,
-    x1: Array,
-    y1: Array,
-    walls: Array,
-    box: Box,
-    state: States,
-    first_in_cell: Rows,
-    in_cell: Rows,
-    first_in_row: Rows,
-    in_row: Rows,
-    out: Flags,
-) -> None:
-    """Fill whether each step leaves the area (kernel)."""
-    cuts = np.empty(3 * len(walls) + 2)
-    for i in range(len(x0)):
-        around = _state_around(x0[i], y0[i], x1[i], y1[i], box, state)
-        if around != MIXED:
-            out[i] = around == OUTSIDE
-            continue
-        share = _free_share(
-            x0[i], y0[i], x1[i], y1[i], True, walls, box, state,
-            first_in_cell, in_cell, first_in_row, in_row, cuts,
-        )  # fmt: skip
-        out[i] = share < np.inf
-
-
-@kernel
 def fill_free_share(
     x0: Array,
     y0: Array,
@@ -87,9 +58,13 @@ def fill_free_share(
     in_cell: Rows,
     first_in_row: Rows,
     in_row: Rows,
+    any_will_do: bool,
     out: Array,
 ) -> None:
-    """Fill the share of each step before it leaves the area, infinite if it does not (kernel)."""
+    """Fill the share of each step before it leaves the area, infinite if it does not (kernel).
+
+    With ``any_will_do`` the first place that is found outside will do, wherever on the step it is.
+    """
     cuts = np.empty(3 * len(walls) + 2)
     for i in range(len(x0)):
         around = _state_around(x0[i], y0[i], x1[i], y1[i], box, state)
@@ -97,7 +72,7 @@ def fill_free_share(
             out[i] = np.inf if around == INSIDE else 0.0
             continue
         out[i] = _free_share(
-            x0[i], y0[i], x1[i], y1[i], False, walls, box, state,
+            x0[i], y0[i], x1[i], y1[i], any_will_do, walls, box, state,
             first_in_cell, in_cell, first_in_row, in_row, cuts,
         )  # fmt: skip
 

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
 from blesim.filters.plan_grid import PlanGrid, plan_grid
-from blesim.filters.plan_kernels import fill_blocked, fill_enterable, fill_free_share
+from blesim.filters.plan_kernels import fill_enterable, fill_free_share
 from blesim.filters.walls import ON_WALL_M
 
 Array = NDArray[np.float64]
@@ -80,9 +80,10 @@ class PlanMotion:
             True for NaN.
         """
         _refuse_unequal(x0_m, y0_m, x1_m, y1_m)
-        out = np.empty(len(x0_m), np.bool_)
-        fill_blocked(x0_m, y0_m, x1_m, y1_m, *self.grid.arrays, out)
-        return out
+        share = np.empty(len(x0_m))
+        fill_free_share(x0_m, y0_m, x1_m, y1_m, *self.grid.arrays, True, share)
+        blocked: Flags = share < np.inf
+        return blocked
 
     def stopped(
         self, x0_m: Array, y0_m: Array, x1_m: Array, y1_m: Array, margin_m: float = 0.01
@@ -105,7 +106,7 @@ class PlanMotion:
         """
         _refuse_unequal(x0_m, y0_m, x1_m, y1_m)
         free = np.empty(len(x0_m))
-        fill_free_share(x0_m, y0_m, x1_m, y1_m, *self.grid.arrays, free)
+        fill_free_share(x0_m, y0_m, x1_m, y1_m, *self.grid.arrays, False, free)
         blocked = free < np.inf
         length_m = np.hypot(x1_m - x0_m, y1_m - y0_m)
         left = max(margin_m, ON_WALL_M) / np.maximum(length_m, ON_WALL_M)
