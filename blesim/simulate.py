@@ -1,14 +1,13 @@
 """From a scenario and a seed to what phones recorded and what really happened."""
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
-from functools import cached_property
 from types import MappingProxyType
 from typing import Self
 
 from blesim import __version__
 from blesim.cast import carriers_of, crowd_of, everybody_in
-from blesim.errors import InvariantError, UsageError
+from blesim.errors import UsageError
 from blesim.observe import Carrier, observed
 from blesim.radio.air import Air
 from blesim.radio.life import Lives, simulate_life
@@ -18,7 +17,7 @@ from blesim.scenario.build import Stage, set_stage
 from blesim.scenario.model import Scenario
 from blesim.scenario.reading import ScenarioFile
 from blesim.walkers.shop_floor import Progress
-from blesim.workers import workers
+from blesim.workers import shared
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -129,15 +128,7 @@ class Simulation:
         BlesimError
             If one of several processes dies.
         """
-        if jobs < 1:
-            raise UsageError(f"jobs {jobs}: at least one process is needed")
-        rows = range(len(self.carriers))
-        if jobs == 1 or len(rows) == 1:
-            air = self.air()
-            yield from (_observed(self, air, row) for row in rows)
-            return
-        with workers(min(jobs, len(rows)), _adopt, (self,)) as crew:
-            yield from crew.results(_observed_by_worker, rows)
+        yield from shared(_observer, (self,), range(len(self.carriers)), jobs)
 
     def recording(self, jobs: int = 1) -> tuple[Recording, Truth]:
         """Recording and truth in memory."""
@@ -156,36 +147,17 @@ class Simulation:
         )
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Adopted:
-    """The simulation that a worker process works for; its air is made there once."""
+def _observer(simulation: Simulation) -> Callable[[int], tuple[Walk, WalkTruth]]:
+    """What observes the carrier of a row; the air is made once for all of them."""
+    air = simulation.air()
 
-    simulation: Simulation
+    def observer(row: int) -> tuple[Walk, WalkTruth]:
+        return observed(
+            simulation.scenario,
+            simulation.stage.graph,
+            simulation.seed,
+            air,
+            simulation.carriers[row],
+        )
 
-    @cached_property
-    def air(self) -> Air:
-        return self.simulation.air()
-
-
-_adopted: _Adopted | None = None
-
-
-def _adopt(simulation: Simulation) -> None:
-    global _adopted
-    _adopted = _Adopted(simulation=simulation)
-
-
-def _observed_by_worker(row: int) -> tuple[Walk, WalkTruth]:
-    if _adopted is None:
-        raise InvariantError("a worker was asked for a walk before it knew the simulation")
-    return _observed(_adopted.simulation, _adopted.air, row)
-
-
-def _observed(simulation: Simulation, air: Air, row: int) -> tuple[Walk, WalkTruth]:
-    return observed(
-        simulation.scenario,
-        simulation.stage.graph,
-        simulation.seed,
-        air,
-        simulation.carriers[row],
-    )
+    return observer

@@ -8,7 +8,7 @@ import os
 import pickle
 import signal
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager, suppress
@@ -18,7 +18,7 @@ from multiprocessing.connection import Connection
 from threading import Thread
 from typing import Any, TypeVar
 
-from blesim.errors import BlesimError
+from blesim.errors import BlesimError, InvariantError, UsageError
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -56,6 +56,58 @@ class Crew:
             raise BlesimError(
                 "a worker process died, perhaps for want of memory; use fewer jobs"
             ) from fault
+
+
+def shared(
+    make: Callable[..., Callable[[T], R]],
+    arguments: tuple[Any, ...],
+    pieces: Sequence[T],
+    jobs: int,
+) -> Generator[R, None, None]:
+    """Results of pieces in their order, the same for any number of processes.
+
+    Who does not take them all closes the generator, which ends its processes.
+
+    Parameters
+    ----------
+    make : callable
+        Called once in each process that works: makes the function that does a piece.
+    arguments : tuple
+        Its arguments.
+    pieces : sequence
+        What is to be done.
+    jobs : int
+        How many processes; with one, or with one piece, this one.
+
+    Raises
+    ------
+    UsageError
+        If `jobs` is less than 1.
+    BlesimError
+        If one of several processes dies.
+    """
+    if jobs < 1:
+        raise UsageError(f"jobs {jobs}: at least one process is needed")
+    if jobs == 1 or len(pieces) < 2:
+        if len(pieces):
+            yield from map(make(*arguments), pieces)
+        return
+    with workers(min(jobs, len(pieces)), _take_up, (make, arguments)) as crew:
+        yield from crew.results(_do, pieces)
+
+
+_work: Callable[[Any], Any] | None = None
+
+
+def _take_up(make: Callable[..., Callable[[T], R]], arguments: tuple[Any, ...]) -> None:
+    global _work
+    _work = make(*arguments)
+
+
+def _do(piece: Any) -> Any:
+    if _work is None:
+        raise InvariantError("a worker was given a piece before it knew its work")
+    return _work(piece)
 
 
 @contextmanager

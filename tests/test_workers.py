@@ -5,8 +5,8 @@ import time
 
 import pytest
 
-from blesim.errors import BlesimError, DataError
-from blesim.workers import workers
+from blesim.errors import BlesimError, DataError, UsageError
+from blesim.workers import shared, workers
 
 PARENT = """
 import sys, time
@@ -102,3 +102,38 @@ def test_workers_die_with_their_parent(tmp_path):
     while alive(worker) and time.monotonic() < until_s:
         time.sleep(0.05)
     assert not alive(worker)
+
+
+def counted(first):
+    """A function that also tells how often it was called in its process."""
+    calls = [0]
+
+    def tell(number):
+        calls[0] += 1
+        return first + number, calls[0]
+
+    return tell
+
+
+def test_shared_work_comes_in_order_from_any_number_of_processes():
+    alone = list(shared(counted, (10,), range(5), 1))
+    assert [result for result, _ in alone] == [10, 11, 12, 13, 14]
+    # Made once in the process, not once a piece.
+    assert [calls for _, calls in alone] == [1, 2, 3, 4, 5]
+    both = list(shared(counted, (10,), range(5), 2))
+    assert [result for result, _ in both] == [10, 11, 12, 13, 14]
+    assert max(calls for _, calls in both) >= 3
+
+
+def test_shared_work_is_done_as_it_is_asked_for():
+    done = []
+    results = shared(lambda: done.append, (), range(5), 1)
+    next(results)
+    assert done == [0]
+    results.close()
+    assert list(shared(counted, (10,), [], 4)) == []
+
+
+def test_shared_work_needs_a_process():
+    with pytest.raises(UsageError, match="jobs 0: at least one process is needed"):
+        next(shared(counted, (10,), range(5), 0))

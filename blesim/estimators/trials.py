@@ -1,14 +1,13 @@
 """Several estimators on all walks of a recording, shared by processes."""
 
-from collections.abc import Generator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass
 
-from blesim.errors import InvariantError, UsageError
 from blesim.estimators.base import Estimator
 from blesim.estimators.run import fit, follow, refuse_missing
 from blesim.recording import Failure, Recording, Walk, WalkKind
 from blesim.tables import Track
-from blesim.workers import workers
+from blesim.workers import shared
 
 Trial = tuple[tuple[str, str], Track | Failure]
 
@@ -60,47 +59,26 @@ class Trials:
         BlesimError
             If one of several processes dies.
         """
-        if jobs < 1:
-            raise UsageError(f"jobs {jobs}: at least one process is needed")
         pairs = [(label, walk.name) for label in self.estimators for walk in self._walks()]
-        if jobs == 1 or len(pairs) < 2:
-            desk = _Desk(trials=self)
-            yield from (desk.tried(pair) for pair in pairs)
-            return
-        with workers(min(jobs, len(pairs)), _sit_down, (self,)) as crew:
-            yield from crew.results(_tried_by_worker, pairs)
+        yield from shared(_desk, (self,), pairs, jobs)
 
     def _walks(self) -> list[Walk]:
         return [walk for walk in self.recording.walks if walk.kind == WalkKind.WALK]
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class _Desk:
-    """Where one process works: each estimator is fitted there once, when its turn comes."""
+def _desk(trials: Trials) -> Callable[[tuple[str, str]], Trial]:
+    """What tries one estimator on one walk; each is fitted once, when its turn comes."""
+    recording = trials.recording
+    learned: dict[str, Estimator | Failure] = {}
 
-    trials: Trials
-    fitted: dict[str, Estimator | Failure] = field(default_factory=dict)
-
-    def tried(self, pair: tuple[str, str]) -> Trial:
+    def tried(pair: tuple[str, str]) -> Trial:
         label, name = pair
-        if label not in self.fitted:
-            self.fitted[label] = fit(self.trials.estimators[label], self.trials.recording)
-        learned, recording = self.fitted[label], self.trials.recording
-        if isinstance(learned, Failure):
-            return pair, learned
+        if label not in learned:
+            learned[label] = fit(trials.estimators[label], recording)
+        fitted = learned[label]
+        if isinstance(fitted, Failure):
+            return pair, fitted
         walk = recording.by_name[name]
-        return pair, follow(learned, recording.venue, walk, seed=self.trials.seed, label=label)
+        return pair, follow(fitted, recording.venue, walk, seed=trials.seed, label=label)
 
-
-_desk: _Desk | None = None
-
-
-def _sit_down(trials: Trials) -> None:
-    global _desk
-    _desk = _Desk(trials=trials)
-
-
-def _tried_by_worker(pair: tuple[str, str]) -> Trial:
-    if _desk is None:
-        raise InvariantError("a worker was asked for a track before it knew the recording")
-    return _desk.tried(pair)
+    return tried

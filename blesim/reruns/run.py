@@ -1,7 +1,8 @@
 """Experiments over many seeds, shared by processes, resumed where they stopped."""
 
 import hashlib
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,12 +10,12 @@ import numpy as np
 
 from blesim import __version__
 from blesim.errors import DataError, UsageError
-from blesim.reruns.base import Experiment, Key, Numbers, Picture
+from blesim.reruns.base import Experiment, Key, Picture
 from blesim.reruns.registry import experiment_of
 from blesim.reruns.sites import scenario_files
 from blesim.reruns.statistics import Figure, Ordering, figures_of, orderings_of, stacked
 from blesim.reruns.trials_on_disk import TrialStore
-from blesim.workers import workers
+from blesim.workers import shared
 
 # A trial: the short name of the paper, and the seed.
 Task = tuple[str, int]
@@ -78,12 +79,8 @@ def trials(
     if scheduler is not None:
         yield from _saved(left, _on_dask(left, scheduler), store)
         return
-    if jobs == 1 or len(left) < 2:
-        results = map(_numbers, left)
+    with closing(shared(_experimenter, (), left, jobs)) as results:
         yield from _saved(left, results, store)
-        return
-    with workers(min(jobs, len(left)), _prepare, ()) as crew:
-        yield from _saved(left, crew.results(_numbers, left), store)
 
 
 def _saved(
@@ -107,8 +104,9 @@ def _on_dask(tasks: Sequence[Task], scheduler: str) -> Iterator[dict[Key, float]
         yield from (future.result() for future in client.map(_numbers, tasks, pure=False))
 
 
-def _prepare() -> None:
-    """Nothing: a worker imports an experiment when its first trial comes."""
+def _experimenter() -> Callable[[Task], dict[Key, float]]:
+    """What does a trial; a process imports an experiment when its first trial comes."""
+    return _numbers
 
 
 def _numbers(task: Task) -> dict[Key, float]:
@@ -150,9 +148,3 @@ def version_text() -> str:
     for path in sorted((*package.rglob("*.py"), *scenario_files())):
         digest.update(path.read_bytes())
     return f"blesim {__version__} {digest.hexdigest()[:16]}, numpy {np.__version__}"
-
-
-def numbers_of(paper: str, seeds: int, store: TrialStore) -> dict[Key, Numbers]:
-    """Numbers of each seed by key, (seeds,), for whoever looks closer."""
-    found = (store.load(paper, FIRST_SEED + number) for number in range(seeds))
-    return stacked([numbers for numbers in found if numbers is not None])
