@@ -27,17 +27,12 @@ from numpy.typing import NDArray
 from blesim.estimators.aisle_zones import AisleZones, no_zones, zones_by_level
 from blesim.estimators.base import Need, StartInfo, fitted
 from blesim.estimators.beacon_fixes import BeaconFixes, only, zone_thresholds_dbm
-from blesim.estimators.gait_settings import (
-    GaitSettings,
-    not_fitted,
-    refuse_other,
-    refuse_outside,
-    required,
-    step_need,
-)
+from blesim.estimators.gait_settings import GaitSettings
 from blesim.estimators.map_headings import MapHeadings, map_headings
 from blesim.estimators.nearest_beacon import BeaconPlaces, beacon_places
+from blesim.estimators.refusals import not_fitted, refuse_other, refuse_outside, required
 from blesim.estimators.step_track import State, StepTracker
+from blesim.estimators.walked_steps import step_need
 from blesim.filters.kalman import predict_covariance, update
 from blesim.kernels import kernel
 from blesim.ranging.smoothing import SignalKind, SignalWindow, refuse_bad_window

@@ -9,10 +9,10 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from blesim.errors import UsageError
-from blesim.estimators.base import Need, StartInfo
+from blesim.estimators.base import Need
+from blesim.estimators.refusals import refuse_other, refuse_outside
 from blesim.estimators.surveyed_steps import learned_steps
-from blesim.estimators.walked_steps import StepReading, StepSource, SystemHeading
+from blesim.estimators.walked_steps import StepReading, StepSource, SystemHeading, step_need
 from blesim.pdr.multi_threshold import MultiThreshold
 from blesim.recording import Recording
 from blesim.venue.venue import Venue
@@ -89,33 +89,3 @@ class GaitSettings:
         )
         known_rad = None if self.offset_deg is None else math.radians(self.offset_deg)
         return learned_steps(how, venue, surveys, known_rad)
-
-
-def step_need(source: StepSource) -> Need:
-    """What a source of steps asks of a walk."""
-    return Need.IMU if source == "imu" else Need.STEPS
-
-
-def required(start: StartInfo | None, who: str) -> StartInfo:
-    """The start, or a `UsageError` that asks for it."""
-    if start is None:
-        raise UsageError(f"{who} needs to know where the walk begins; give a start")
-    return start
-
-
-def not_fitted(who: str) -> UsageError:
-    """Error of an estimator that was started before `fit`."""
-    return UsageError(f"{who} does not know the venue yet; call fit first")
-
-
-def refuse_other(name: str, value: str, known: Sequence[str]) -> None:
-    """Raise `UsageError` for a word that is none of those known."""
-    if value not in known:
-        raise UsageError(f"{name} '{value}': use one of {', '.join(known)}")
-
-
-def refuse_outside(**settings: tuple[float, float, float]) -> None:
-    """Raise `UsageError` for the first setting whose value is not within its low and high."""
-    for name, (value, low, high) in settings.items():
-        if not low <= value <= high:
-            raise UsageError(f"{name} {value:g}: give {low:g} to {high:g}")

@@ -14,15 +14,11 @@ import numpy as np
 
 from blesim.estimators.aisle_zones import AisleZones, no_zones, zones_by_level
 from blesim.estimators.base import Need, StartInfo, fitted
-from blesim.estimators.gait_settings import (
-    GaitSettings,
-    not_fitted,
-    refuse_outside,
-    required,
-    step_need,
-)
+from blesim.estimators.gait_settings import GaitSettings
 from blesim.estimators.map_headings import MapHeadings, map_headings
+from blesim.estimators.refusals import not_fitted, refuse_outside, required
 from blesim.estimators.step_track import State, StepTracker
+from blesim.estimators.walked_steps import step_need
 from blesim.pdr.dead_reckoning import DeadReckoning, StepErrors
 from blesim.recording import Recording
 from blesim.venue.venue import Venue

@@ -24,12 +24,13 @@ from numpy.typing import NDArray
 
 from blesim.columns import LONGEST_STEP_M
 from blesim.estimators.base import Need
-from blesim.estimators.gait_settings import refuse_other, refuse_outside, step_need
+from blesim.estimators.refusals import refuse_other, refuse_outside
 from blesim.estimators.surveyed_steps import learned_steps
 from blesim.estimators.walked_steps import (
     StepReading,
     StepSource,
     SystemHeading,
+    step_need,
 )
 from blesim.filters.particles import weighted_moments
 from blesim.filters.plan_motion import PlanMotion

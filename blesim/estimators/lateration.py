@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from blesim.errors import UsageError
 from blesim.estimators.base import Need, StartInfo, fitted, make_track
 from blesim.estimators.believed_path_loss import PathLossBelief
-from blesim.estimators.gait_settings import not_fitted
 from blesim.estimators.heard import SignalTracker, boxes_m, strongest
+from blesim.estimators.refusals import not_fitted
 from blesim.ranging.lateration import LaterationFix, Loss, Outcome, laterate
 from blesim.ranging.path_loss_fit import PathLossFit
 from blesim.ranging.smoothing import SignalKind, SignalWindow, refuse_bad_window

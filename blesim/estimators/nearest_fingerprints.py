@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from blesim.errors import UsageError
 from blesim.estimators.base import Need, StartInfo, fitted, make_track
-from blesim.estimators.gait_settings import not_fitted
 from blesim.estimators.heard import SignalTracker
+from blesim.estimators.refusals import not_fitted
 from blesim.ranging.nearest_fingerprints import Compared, NearestFingerprints
 from blesim.ranging.radio_map import MapLayout, radio_map
 from blesim.ranging.smoothing import SignalKind, SignalWindow, refuse_bad_window

@@ -19,16 +19,16 @@ from blesim.estimators.fingerprint_survey import (
     FingerprintSurvey,
     learned_survey,
 )
-from blesim.estimators.gait_settings import (
-    not_fitted,
-    refuse_other,
-    refuse_outside,
-    required,
-    step_need,
-)
+from blesim.estimators.refusals import not_fitted, refuse_other, refuse_outside, required
 from blesim.estimators.step_track import HeldStates, State, merged
 from blesim.estimators.surveyed_steps import learned_steps
-from blesim.estimators.walked_steps import StepReading, StepSource, StepWatch, SystemHeading
+from blesim.estimators.walked_steps import (
+    StepReading,
+    StepSource,
+    StepWatch,
+    SystemHeading,
+    step_need,
+)
 from blesim.filters.kalman import update
 from blesim.pdr.double_threshold import DoubleThreshold
 from blesim.pdr.step_length import FixedLength

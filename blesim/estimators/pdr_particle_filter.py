@@ -17,10 +17,16 @@ from blesim.estimators.base import Need, StartInfo, fitted
 from blesim.estimators.believed_path_loss import PathLossBelief
 from blesim.estimators.clocked_tracker import walked
 from blesim.estimators.floors import Floors
-from blesim.estimators.gait_settings import not_fitted, refuse_other, refuse_outside, step_need
 from blesim.estimators.heard import known_readings, moments_track
+from blesim.estimators.refusals import not_fitted, refuse_other, refuse_outside
 from blesim.estimators.surveyed_steps import learned_steps
-from blesim.estimators.walked_steps import StepReading, StepSource, StepWatch, SystemHeading
+from blesim.estimators.walked_steps import (
+    StepReading,
+    StepSource,
+    StepWatch,
+    SystemHeading,
+    step_need,
+)
 from blesim.estimators.walking_cloud import CloudSettings, WalkingCloud
 from blesim.ranging.path_loss_fit import PathLossFit
 from blesim.ranging.smoothing import SignalWindow

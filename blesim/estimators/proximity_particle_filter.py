@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from blesim.estimators.base import Need, StartInfo, fitted
 from blesim.estimators.clocked_tracker import ClockedTracker
 from blesim.estimators.floors import Floors
-from blesim.estimators.gait_settings import not_fitted, refuse_other, step_need
 from blesim.estimators.kept_likelihoods import KeptLikelihoods
-from blesim.estimators.walked_steps import StepReading
+from blesim.estimators.refusals import not_fitted, refuse_other
+from blesim.estimators.walked_steps import StepReading, step_need
 from blesim.filters.plan_motion import PlanMotion
 from blesim.ranging.proximity import (
     Proximity,

@@ -16,9 +16,9 @@ from blesim.estimators.base import StartInfo, fitted
 from blesim.estimators.believed_path_loss import PathLossBelief
 from blesim.estimators.clocked_tracker import ClockedTracker
 from blesim.estimators.floors import Floors
-from blesim.estimators.gait_settings import not_fitted, refuse_outside
 from blesim.estimators.kept_likelihoods import KeptLikelihoods
 from blesim.estimators.lateration import LiveLateration, Ranging
+from blesim.estimators.refusals import not_fitted, refuse_outside
 from blesim.estimators.walked_steps import StepReading
 from blesim.ranging.lateration import LaterationFix, Outcome
 from blesim.ranging.smoothing import SignalWindow

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from blesim.estimators.base import Need, StartInfo, fitted
 from blesim.estimators.believed_path_loss import PathLossBelief
 from blesim.estimators.constant_velocity import moved
-from blesim.estimators.gait_settings import not_fitted, refuse_outside
 from blesim.estimators.heard import chunks, known_readings, moments_track, strongest
 from blesim.estimators.lateration import Ranging
+from blesim.estimators.refusals import not_fitted, refuse_outside
 from blesim.filters import unscented
 from blesim.filters.gating import JointGate
 from blesim.filters.unscented import Scaling

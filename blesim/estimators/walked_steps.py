@@ -12,6 +12,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from blesim.estimators.base import Need
 from blesim.pdr.attitude import Leveller, Levelling
 from blesim.pdr.double_threshold import DoubleThreshold, DoubleThresholdDetector
 from blesim.pdr.features import StepFeatureReader, StepFeatures, StepFelt
@@ -61,6 +62,11 @@ class WalkedSteps:
     def __len__(self) -> int:
         """Count the steps."""
         return len(self.time_us)
+
+
+def step_need(source: StepSource) -> Need:
+    """What a source of steps asks of a walk."""
+    return Need.IMU if source == "imu" else Need.STEPS
 
 
 class StepWatch(Protocol):

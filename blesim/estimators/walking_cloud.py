@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from blesim.estimators.gait_settings import refuse_other, refuse_outside
+from blesim.estimators.refusals import refuse_other, refuse_outside
 from blesim.filters.particles import normalised, weighted_moments
 from blesim.filters.plan_motion import PlanMotion
 from blesim.filters.resampling import effective_sample_size, systematic

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from blesim.errors import UsageError
 from blesim.estimators.base import Need, StartInfo, fitted
-from blesim.estimators.gait_settings import not_fitted
 from blesim.estimators.heard import SignalTracker, moments_track, strongest
 from blesim.estimators.nearest_beacon import beacon_places
+from blesim.estimators.refusals import not_fitted
 from blesim.kernels import kernel
 from blesim.ranging.smoothing import SignalKind, SignalWindow, refuse_bad_window
 from blesim.recording import Recording
