@@ -50,19 +50,6 @@ class Link:
         """Mean RSSI. [dBm]."""
         return float(self.rssi_dbm.mean())
 
-    def on_channel(self, channel: int) -> "Link":
-        """The readings of one channel."""
-        rows = self.channel == channel
-        return Link(
-            walk=self.walk,
-            beacon=self.beacon,
-            time_s=self.time_s[rows],
-            rssi_dbm=self.rssi_dbm[rows],
-            channel=self.channel[rows],
-            place_m=self.place_m[rows],
-            distance_m=self.distance_m[rows],
-        )
-
 
 def links_of(
     venue: Venue, walks: Sequence[tuple[Walk, WalkTruth]], height_m: float, fewest: int = 1
