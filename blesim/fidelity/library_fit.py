@@ -4,10 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from blesim.radio.phone import Phone, Receiver, Scanner
+from blesim.radio.phone import Phone
+from blesim.radio.profiles import PROFILES, library_phone
 from blesim.radio.propagation import Propagation
-
-PHONE_HEIGHT_M = 1.2
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,10 +27,15 @@ class PhoneFit:
 
     def phone(self) -> Phone:
         """The phone as a profile."""
-        return Phone(
-            scanner=Scanner(interval_ms=1000.0, window_ms=self.window_ms),
-            receiver=Receiver(offset_db=self.offset_db, sensitivity_dbm=self.sensitivity_dbm),
-            height_m=PHONE_HEIGHT_M,
+        return library_phone(self.offset_db, self.sensitivity_dbm, self.window_ms)
+
+    @classmethod
+    def of(cls, phone: Phone) -> "PhoneFit":
+        """What a profile says."""
+        return cls(
+            offset_db=phone.receiver.offset_db,
+            sensitivity_dbm=phone.receiver.sensitivity_dbm,
+            window_ms=phone.scanner.window_us / 1000.0,
         )
 
 
@@ -81,10 +85,6 @@ LIBRARY = LibraryFit(
     body_loss_db=8.2,
     rice_factor_db=7.8,
     phones=MappingProxyType(
-        {
-            "A5": PhoneFit(offset_db=16.4, sensitivity_dbm=-87.8, window_ms=119.0),
-            "BQ": PhoneFit(offset_db=-3.4, sensitivity_dbm=-94.4, window_ms=225.0),
-            "S6": PhoneFit(offset_db=-1.6, sensitivity_dbm=-91.5, window_ms=543.0),
-        }
+        {name: PhoneFit.of(PROFILES[f"uji-{name.lower()}"]) for name in ("A5", "BQ", "S6")}
     ),
 )

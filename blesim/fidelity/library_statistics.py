@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from blesim.fidelity.comparison import Panel, distribution
 from blesim.fidelity.correlation import correlation_between_places
-from blesim.fidelity.library_fit import PHONE_HEIGHT_M
 from blesim.fidelity.path_fit import PathFit, fit_path
 from blesim.fidelity.scorecard import Statistic
+from blesim.radio.profiles import LIBRARY_HEIGHT_M
 from blesim.recording import Walk, WalkTruth
 from blesim.units import wrap_angle
 from blesim.venue.line_of_sight import LineOfSight
@@ -126,7 +126,7 @@ class Links:
 
 def links_of_phone(library: Library, points: Sequence[Point]) -> Links:
     """Links between points and all beacons."""
-    places_m = np.array([[*point.place_m, PHONE_HEIGHT_M] for point in points])
+    places_m = np.array([[*point.place_m, LIBRARY_HEIGHT_M] for point in points])
     beacons_m = library.venue.beacon_xyz_m
     start_m = np.repeat(places_m, len(beacons_m), axis=0)
     end_m = np.tile(beacons_m, (len(places_m), 1))
