@@ -21,12 +21,13 @@ from blesim.estimators.fingerprint_maps import (
 )
 from blesim.filters.gating import SeparateGate
 from blesim.ranging.channels import SLOTS
+from blesim.ranging.curves import ENOUGH_POINTS
 from blesim.ranging.polynomial_range import (
     PolynomialRange,
     fit_polynomial_ranges,
     refuse_bad_degree,
 )
-from blesim.ranging.survey_readings import SurveyReadings, survey_readings
+from blesim.ranging.survey_readings import SurveyReadings, calibration_points, survey_readings
 from blesim.recording import Recording
 from blesim.venue.venue import Venue
 
@@ -142,11 +143,16 @@ class ChannelEkf(EpochSettings):
         return fitted(self, ranges=ranges)
 
     def _curves(self, survey: SurveyReadings, venue: Venue) -> tuple[PolynomialRange, ...]:
-        """Polynomials of all beacons, for each slot of the signal from which one is made."""
+        """Polynomials of all beacons, for each slot of the signal from which one is made.
+
+        Fitted on the mean RSSI at each calibration point, as in Eq 3.
+        """
+        points = calibration_points(survey, by_channel=self.separate)
         found = fit_polynomial_ranges(
-            survey,
-            survey.distance_m(venue, self.phone_height_m),
+            points,
+            points.distance_m(venue, self.phone_height_m),
             degree=self.degree,
+            enough=ENOUGH_POINTS,
             by="beacon and channel" if self.separate else "beacon",
         )
         slots = range(1, SLOTS) if self.separate else (0,)

@@ -11,9 +11,10 @@ from blesim.errors import UsageError
 from blesim.estimators.base import Need, StartInfo, fitted
 from blesim.estimators.constant_velocity import Belief, at_rest, updated_by_ranges
 from blesim.estimators.epochs import EpochSettings, EpochTracker, refuse_bad_height
+from blesim.ranging.curves import ENOUGH_POINTS
 from blesim.ranging.lateration import laterate
 from blesim.ranging.path_loss_fit import PathLossCurves, PathLossFit, fit_path_loss
-from blesim.ranging.survey_readings import survey_readings
+from blesim.ranging.survey_readings import calibration_points, survey_readings
 from blesim.recording import Recording
 from blesim.venue.venue import Venue
 
@@ -67,8 +68,9 @@ class PathLossEkf(EpochSettings):
         DataError
             If the survey tells no curve.
         """
-        survey = survey_readings(surveys)
-        curves = fit_path_loss(survey, survey.distance_m(venue, self.phone_height_m))
+        points = calibration_points(survey_readings(surveys), by_channel=False)
+        distance_m = points.distance_m(venue, self.phone_height_m)
+        curves = fit_path_loss(points, distance_m, enough=ENOUGH_POINTS)
         ranges = PathLossRanges(
             beacons_m=venue.beacon_xyz_m,
             levels=venue.beacon_level,

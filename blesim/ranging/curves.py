@@ -76,6 +76,10 @@ class Enough:
         return len(distance_m) >= self.readings and different >= self.distances
 
 
+# Of means at calibration points, which scatter less than readings.
+ENOUGH_POINTS = Enough(readings=10)
+
+
 def fit_curves(
     survey: SurveyReadings,
     distance_m: NDArray[np.float64],

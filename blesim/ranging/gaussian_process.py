@@ -6,7 +6,7 @@ the kernel's parameters are those of the highest marginal likelihood [2]_.
 
 References
 ----------
-.. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-ekf".
+.. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-separate-ekf".
 .. [2] C. E. Rasmussen, C. K. I. Williams, "Gaussian Processes for Machine Learning", MIT Press,
    2006, chapters 2 and 5.
 """

@@ -9,7 +9,7 @@ After [1]_, where ``RSS_m`` is what is measured of N beacons and ``RSS_i`` finge
 
 References
 ----------
-.. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-ekf".
+.. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-separate-ekf".
 """
 
 from dataclasses import dataclass, field

@@ -5,8 +5,9 @@ of the RSSI.
 
 References
 ----------
-.. [1] The aisle-graph particle filter in a wholesale store, 2016; digest "aisle-graph".
-.. [2] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-ekf".
+.. [1] The aisle-graph particle filter in a wholesale store, 2016;
+   digest "aisle-graph-particle-filter".
+.. [2] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-separate-ekf".
 """
 
 from dataclasses import dataclass

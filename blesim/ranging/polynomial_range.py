@@ -6,7 +6,7 @@ the distance. Powers of RSSI in dBm are nearly collinear, so the fit is made in 
 
 References
 ----------
-.. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-ekf".
+.. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-separate-ekf".
 """
 
 from dataclasses import dataclass

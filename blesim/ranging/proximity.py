@@ -6,7 +6,8 @@ Immediate up to about 1 m, Near from 1 to 3 m, Far beyond, Unknown when nothing 
 
 References
 ----------
-.. [1] Particle filter on beacon proximity and a floor map, about 2017; digest "proximity-pf".
+.. [1] Particle filter on beacon proximity and a floor map, about 2017;
+   digest "proximity-particle-filter".
 """
 
 from dataclasses import dataclass, replace

@@ -5,7 +5,8 @@ draws a line through the shares: Eq 5, ``P(d) = 1.1077 - 0.3053 d``, from 0 to 2
 
 References
 ----------
-.. [1] Particle filter on beacon proximity and a floor map, about 2017; digest "proximity-pf".
+.. [1] Particle filter on beacon proximity and a floor map, about 2017;
+   digest "proximity-particle-filter".
 """
 
 from dataclasses import dataclass, field

@@ -9,7 +9,8 @@ oldest) to r_k of the window the signal value is, after [1]_:
 
 References
 ----------
-.. [1] The aisle-graph particle filter in a wholesale store, 2016; digest "aisle-graph".
+.. [1] The aisle-graph particle filter in a wholesale store, 2016;
+   digest "aisle-graph-particle-filter".
 """
 
 from typing import Any, Literal, get_args

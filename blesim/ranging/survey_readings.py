@@ -205,6 +205,52 @@ def _numbered(columns: dict[str, NDArray[Any]]) -> NDArray[np.int64]:
     return spot
 
 
+def calibration_points(
+    survey: SurveyReadings, *, by_channel: bool, cell_m: float = 1.0
+) -> SurveyReadings:
+    """Mean RSSI of each beacon at each calibration point, a reading each, in no known order.
+
+    A point is a spot the tester stood at, whichever way it looked; readings on the way from one to
+    the next do not count. If nobody ever stood, points are the cells of a grid about the map's
+    origin. Headings and walks are no longer known.
+
+    Parameters
+    ----------
+    survey : SurveyReadings
+        n readings.
+    by_channel : bool
+        Whether to keep channels apart; together they have channel 0.
+    cell_m : float
+        Side of a cell. [m]
+    """
+    stood = survey.spot != WALKING
+    if np.any(stood):
+        survey = survey.rows(stood)
+        point = [survey.spot]
+    else:
+        cells = (np.floor(axis / cell_m) for axis in (survey.x_m, survey.y_m))
+        point = [survey.level, *(cell.astype(np.int64) for cell in cells)]
+    channel = survey.channel if by_channel else np.zeros_like(survey.channel)
+    group = group_of([*point, survey.beacon, channel])
+    _, first = np.unique(group, return_index=True)
+    count = np.bincount(group)
+    nothing = np.zeros(len(first), np.int64)
+    return SurveyReadings(
+        beacons=survey.beacons,
+        time_us=survey.time_us[first],
+        beacon=survey.beacon[first],
+        channel=channel[first],
+        proximity=nothing,
+        rssi_dbm=np.bincount(group, survey.rssi_dbm) / count,
+        x_m=np.bincount(group, survey.x_m) / count,
+        y_m=np.bincount(group, survey.y_m) / count,
+        level=survey.level[first],
+        heading_rad=np.full(len(first), np.nan),
+        spot=survey.spot[first],
+        walk=nothing,
+    )
+
+
 def group_of(columns: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
     """Number of each row's combination of values, (n,): from 0, in the order of the values.
 

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from blesim.errors import DataError, VenueError
 from blesim.estimators.practice import practice_recording, practice_venue
-from blesim.ranging.survey_readings import WALKING, survey_readings
+from blesim.ranging.survey_readings import WALKING, calibration_points, survey_readings
 from blesim.recording import Observations, Provenance, Recording, Walk, WalkKind
 from blesim.tables import Marks, Readings
 
@@ -132,6 +132,29 @@ def test_surveys_of_different_beacons_are_refused():
     other = replace(one, venue=one.venue.with_beacons(one.venue.beacons[:1]))
     with pytest.raises(DataError, match="different beacons"):
         survey_readings([one, other])
+
+
+def stood_twice_and_walked():
+    """Readings at one spot by two channels, looking two ways, then on a way of 4 m in 4 s."""
+    marks = [(0, 2, 2, 0, 0.0), (2, 2, 2, 0, 1.5), (4, 2, 2, 0, NO), (8, 6, 2, 0, NO)]
+    found = survey_readings([survey(marks, [0.5, 1.5, 2.5, 3.5, 4.25, 4.75, 6.5])])
+    levels_dbm = np.array([-60.0, -64.0, -70.0, -72.0, -80.0, -82.0, -90.0])
+    return replace(found, rssi_dbm=levels_dbm, channel=np.array([37, 37, 38, 37, 39, 39, 39]))
+
+
+def test_a_calibration_point_is_the_mean_where_somebody_stood_worked_by_hand():
+    apart = calibration_points(stood_twice_and_walked(), by_channel=True)
+    found = sorted(zip(apart.channel, apart.rssi_dbm, apart.x_m, apart.spot, strict=True))
+    assert found == [(37, pytest.approx(-196 / 3), 2.0, 0), (38, -70.0, 2.0, 0)]
+    together = calibration_points(stood_twice_and_walked(), by_channel=False)
+    assert (together.rssi_dbm.tolist(), together.channel.tolist()) == ([-66.5], [0])
+
+
+def test_where_nobody_stood_points_are_cells_worked_by_hand():
+    survey = stood_twice_and_walked()
+    cells = calibration_points(survey.rows(survey.spot == WALKING), by_channel=True)
+    # From 2 to 3 m and from 4 to 5 m of the way.
+    assert sorted(zip(cells.rssi_dbm, cells.x_m, strict=True)) == [(-90.0, 4.5), (-81.0, 2.5)]
 
 
 def test_columns_cannot_be_changed():
