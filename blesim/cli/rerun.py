@@ -28,6 +28,12 @@ def rerun(
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a dask scheduler that shares the work instead.")
     ] = None,
+    what_if: Annotated[
+        bool,
+        typer.Option(
+            "--what-if", help="Also with one thing changed at a time, to see what hangs on it."
+        ),
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print the numbers as JSON.")] = False,
 ) -> None:
     """Rerun published experiments; resumes where it stopped.
@@ -40,14 +46,14 @@ def rerun(
     from blesim.reruns.trials_on_disk import TrialStore
 
     papers = PAPERS if paper == "all" else (paper,)
-    tasks = tasks_of(papers, seeds)
+    tasks = tasks_of(papers, seeds, what_if=what_if)
     folder = output_path((output or Path("output", "reruns")) / "reruns.json", "").parent
     store = TrialStore(folder=folder, version=version_text())
     done = trials(tasks, store, jobs or os.cpu_count() or 1, scheduler)
     with closing(done):
         for _ in progress(done, len(tasks), "trial"):
             pass
-    reruns = [summarised(each, seeds, store) for each in papers]
+    reruns = [summarised(each, seeds, store, what_if=what_if) for each in papers]
     write_reruns(reruns, folder)
     if as_json:
         answer_json(as_dict(reruns))

@@ -76,8 +76,7 @@ class ErrorStatePdr(GaitSettings):
         Whether q of Eq 24 is taken over as dead-reckoned position, after which all errors begin at
         zero, as an error-state filter does; or the errors of length and heading stay for all steps
         to come, as Eq 17 reads to the letter: with Q of 1 m2 a step, one fix then changes every
-        later step, and a walk with few fixes runs away (44.7 m against 5.7 m on the first simulated
-        one).
+        later step, and errors double (4.0 m against 2.2 m on walks like the paper's, ten seeds).
     zone_dbm, zone_m, fix_s, signal, rate
         Zones and fixes, as of `BeaconMatchedPdr`. [dBm], [m], [s], [-], [-]
     first_step_m, first_heading_deg : float

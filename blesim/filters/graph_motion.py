@@ -11,7 +11,8 @@ edge at a node brings as many particles as every other, and takes as many away.
 
 References
 ----------
-.. [1] The aisle-graph particle filter in a wholesale store, 2016, Eq 7; digest "aisle-graph".
+.. [1] The aisle-graph particle filter in a wholesale store, 2016, Eq 7;
+   digest "aisle-graph-particle-filter".
 """
 
 from dataclasses import dataclass

@@ -6,7 +6,8 @@ aisle-graph paper [1]_ wished for in the place of its random velocities; how is 
 
 References
 ----------
-.. [1] The aisle-graph particle filter in a wholesale store, 2016; digest "aisle-graph".
+.. [1] The aisle-graph particle filter in a wholesale store, 2016;
+   digest "aisle-graph-particle-filter".
 """
 
 import numpy as np

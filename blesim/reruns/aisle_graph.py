@@ -5,17 +5,18 @@ the search are those of the result, as the paper's tables 1 and 2 agree on run 1
 
 References
 ----------
-.. [1] The aisle-graph particle filter in a wholesale store, 2016; digest "aisle-graph".
+.. [1] The aisle-graph particle filter in a wholesale store, 2016;
+   digest "aisle-graph-particle-filter".
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TypeVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
 from blesim.estimators.base import Estimator
-from blesim.recording import Recording, Truth
+from blesim.recording import Recording
 from blesim.reruns.aisle_graph_numbers import (
     AVERAGED,
     BANDS_M,
@@ -43,40 +44,63 @@ from blesim.reruns.aisle_graph_numbers import (
 )
 from blesim.reruns.aisle_graph_pictures import overview_pictures, seed_pictures
 from blesim.reruns.aisle_graph_search import (
-    beacon_pairs,
+    BASELINE_PARTICLES,
+    LABEL,
+    Grids,
     best_of,
     errors_m,
-    nearest_averaged,
-    nearest_highest,
-    particle_filters,
+    searched,
 )
 from blesim.reruns.aisle_graph_signals import aisle_signals, bump, fitted_exponent
 from blesim.reruns.aisle_graph_significance import Difference, clustered, welch
 from blesim.reruns.base import Expected, Key, Numbers, Picture, Published, Trial
 from blesim.reruns.sites import scenario_of
 from blesim.simulate import Simulation
+from blesim.venue.venue import Venue
 
 T = TypeVar("T")
 
 _TUNING_RUN = RUNS[0]
-_BASELINE_PARTICLES = 500
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AisleGraph:
-    """Experiment of the aisle-graph paper."""
+    """Experiment of the aisle-graph paper.
+
+    Attributes
+    ----------
+    paper, title : str
+    published : sequence of Published
+    expected : sequence of Expected
+    values : mapping of str to object
+        What stands in place of the scenario's own, by path; see `blesim.scenario.other_values`.
+    shelves : str or None
+        What all shelves are loaded with, a name of `MATERIALS`; where not given, what the map says.
+    grids : callable
+        What the search on run 1 chooses from; rows that it leaves out have no numbers.
+    redrawn : bool
+        Whether the chosen filters are followed with other random numbers than those of the search.
+    """
 
     paper: str = "aisle-graph"
     title: str = "graph particle filter in a wholesale store (IPIN 2016)"
     published: Sequence[Published] = PUBLISHED
     expected: Sequence[Expected] = EXPECTED
+    values: Mapping[str, Any] = field(default_factory=dict)
+    shelves: str | None = None
+    grids: Callable[[], Grids] = searched
+    redrawn: bool = False
 
     def trial(self, seed: int, *, pictures: bool = False) -> Trial:
         """Numbers of one seed: tables 1 to 3, the tests, and figures 5 to 7."""
-        recording, truth = Simulation.run(scenario_of("wholesale-section"), seed).recording()
-        chosen = _chosen(recording, truth, seed)
+        recording, truth = self._simulation(seed).recording()
+        chosen = {
+            row: best_of(grid, recording, truth, _TUNING_RUN, seed)
+            for row, grid in self.grids().items()
+        }
+        label = f"{LABEL} again" if self.redrawn else LABEL
         errors = {
-            row: [errors_m(each, recording, truth, run, seed) for run in RUNS]
+            row: [errors_m(each, recording, truth, run, seed, label) for run in RUNS]
             for row, each in chosen.items()
         }
         numbers = {
@@ -93,25 +117,28 @@ class AisleGraph:
         )
         return Trial(numbers=numbers, pictures=tuple(drawn))
 
+    def _simulation(self, seed: int) -> Simulation:
+        simulation = Simulation.run(scenario_of("wholesale-section", self.values), seed)
+        if self.shelves is None:
+            return simulation
+        built = reshelved(simulation.stage.built, self.shelves)
+        return replace(simulation, stage=replace(simulation.stage, built=built))
+
     def overview(self, numbers: Mapping[Key, Numbers]) -> Sequence[Picture]:
         """Errors of the methods by run, and of the filter by the number of particles."""
         return overview_pictures(numbers, {each.key: each.value for each in self.published})
 
 
-def _chosen(recording: Recording, truth: Truth, seed: int) -> dict[str, Estimator]:
-    """What the search on run 1 chooses, by row of the tables."""
-    grids: dict[str, Sequence[Estimator]] = {
-        NEAREST: nearest_highest(),
-        AVERAGED: nearest_averaged(),
-        PAIR: beacon_pairs(),
-    }
-    grids |= {particles_row(count): particle_filters(count) for count in PARTICLES}
-    return {row: best_of(grid, recording, truth, _TUNING_RUN, seed) for row, grid in grids.items()}
+def reshelved(venue: Venue, material: str) -> Venue:
+    """The venue with all its obstacles of one material, a name of `MATERIALS`."""
+    plan = venue.floor_plan
+    obstacles = tuple(replace(obstacle, material=material) for obstacle in plan.obstacles)
+    return replace(venue, floor_plan=replace(plan, obstacles=obstacles))
 
 
 def _of_methods(by_row: Mapping[str, T]) -> dict[str, T]:
     """What belongs to the three methods of table 2."""
-    rows = (NEAREST, PAIR, particles_row(_BASELINE_PARTICLES))
+    rows = (NEAREST, PAIR, particles_row(BASELINE_PARTICLES))
     return dict(zip((NEAREST, PAIR, FILTER), (by_row[row] for row in rows), strict=True))
 
 
@@ -127,7 +154,7 @@ def _error_numbers(errors: Mapping[str, Sequence[Numbers]]) -> Iterator[tuple[Ke
         for column, error_m in zip(COLUMNS, (*runs, np.concatenate(runs)), strict=True):
             yield error_key(method, column), float(error_m.mean())
             yield error_key(method, column, "std"), float(error_m.std())
-    for count in PARTICLES:
+    for count in (each for each in PARTICLES if particles_row(each) in errors):
         runs = errors[particles_row(count)]
         for column, error_m in zip(COLUMNS, (*runs, np.concatenate(runs)), strict=True):
             yield particles_key(count, column), float(error_m.mean())

@@ -2,7 +2,8 @@
 
 References
 ----------
-.. [1] The aisle-graph particle filter in a wholesale store, 2016; digest "aisle-graph".
+.. [1] The aisle-graph particle filter in a wholesale store, 2016;
+   digest "aisle-graph-particle-filter".
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -10,7 +10,8 @@ and of its choices:
 - V_max: 4 and 6 m/s, those chosen.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict
 from itertools import product
 from typing import TypeVar
 
@@ -18,15 +19,19 @@ from blesim.errors import DataError
 from blesim.estimators.base import Estimator
 from blesim.estimators.beacon_pair import BeaconPair
 from blesim.estimators.graph_particle_filter import GraphParticleFilter
+from blesim.estimators.graph_tunings import PRESETS
 from blesim.estimators.nearest_beacon import NearestBeacon
 from blesim.estimators.run import fit, follow
 from blesim.metrics.position_error import position_errors
 from blesim.ranging.smoothing import SignalKind
 from blesim.recording import Failure, Recording, Truth, Walk
+from blesim.reruns.aisle_graph_numbers import AVERAGED, NEAREST, PAIR, PARTICLES, particles_row
 from blesim.reruns.base import Numbers
 from blesim.tables import Track
 
 E = TypeVar("E", bound=Estimator)
+# What a search chooses from, by row of the paper's tables.
+Grids = Mapping[str, Sequence[Estimator]]
 
 WINDOWS_S = (1.0, 2.0, 3.0)
 RATES = (0.25, 0.5, 0.75, 1.0)
@@ -35,7 +40,47 @@ SPREADS_OTHER_DB = (4.0, 5.0, 6.0, 7.0)
 VELOCITY_SPREADS_M_S = (2.0, 2.5, 3.0, 3.5)
 VELOCITY_LIMITS_M_S = (4.0, 6.0)
 # All settings draw the same random numbers, so that they are compared by what they are.
-_LABEL = "aisle-graph"
+LABEL = "aisle-graph"
+BASELINE_PARTICLES = 500
+
+
+def searched() -> Grids:
+    """What every row of the tables was chosen from."""
+    filters = {particles_row(count): particle_filters(count) for count in PARTICLES}
+    return _without_particles() | filters
+
+
+def methods_searched() -> Grids:
+    """The three methods of table 2 alone: other numbers of particles take most of the time."""
+    return _without_particles() | {
+        particles_row(BASELINE_PARTICLES): particle_filters(BASELINE_PARTICLES)
+    }
+
+
+def methods_searched_wider() -> Grids:
+    """The three methods, the particle filter with smaller sigma and V_d than the paper chose."""
+    settings = product((1.0, 2.0, 3.0, 4.0), (2.0, 4.0, 6.0), (0.5, 1.0, 2.0, 3.0), (2.0, 4.0))
+    return _without_particles() | {
+        particles_row(BASELINE_PARTICLES): _filters(BASELINE_PARTICLES, settings)
+    }
+
+
+def printed() -> Grids:
+    """What the paper chose, with nothing else to choose from."""
+    presets = (PRESETS["table-3-250"], PRESETS["table-1-500"], PRESETS["table-3-1000"])
+    return {
+        NEAREST: (NearestBeacon(signal="highest", window_s=3.0),),
+        AVERAGED: (NearestBeacon(signal="averaged", window_s=3.0, rate=0.25),),
+        PAIR: (BeaconPair(signal="averaged", window_s=3.0, rate=0.75, output_rate=0.5),),
+        **{
+            particles_row(tuning.particles): (GraphParticleFilter(**asdict(tuning)),)
+            for tuning in presets
+        },
+    }
+
+
+def _without_particles() -> dict[str, Sequence[Estimator]]:
+    return {NEAREST: nearest_highest(), AVERAGED: nearest_averaged(), PAIR: beacon_pairs()}
 
 
 def nearest_highest() -> Sequence[NearestBeacon]:
@@ -64,6 +109,13 @@ def beacon_pairs() -> Sequence[BeaconPair]:
 
 def particle_filters(particles: int) -> Sequence[GraphParticleFilter]:
     """Grid of the particle filter."""
+    settings = product(SPREADS_SAME_DB, SPREADS_OTHER_DB, VELOCITY_SPREADS_M_S, VELOCITY_LIMITS_M_S)
+    return _filters(particles, settings)
+
+
+def _filters(
+    particles: int, settings: Iterable[tuple[float, float, float, float]]
+) -> Sequence[GraphParticleFilter]:
     return [
         GraphParticleFilter(
             particles=particles,
@@ -72,9 +124,7 @@ def particle_filters(particles: int) -> Sequence[GraphParticleFilter]:
             velocity_spread_m_s=spread_m_s,
             velocity_limit_m_s=limit_m_s,
         )
-        for same_db, other_db, spread_m_s, limit_m_s in product(
-            SPREADS_SAME_DB, SPREADS_OTHER_DB, VELOCITY_SPREADS_M_S, VELOCITY_LIMITS_M_S
-        )
+        for same_db, other_db, spread_m_s, limit_m_s in settings
     ]
 
 
@@ -84,16 +134,23 @@ def best_of(grid: Iterable[E], recording: Recording, truth: Truth, run: str, see
 
 
 def errors_m(
-    estimator: Estimator, recording: Recording, truth: Truth, run: str, seed: int
+    estimator: Estimator,
+    recording: Recording,
+    truth: Truth,
+    run: str,
+    seed: int,
+    label: str = LABEL,
 ) -> Numbers:
-    """Errors after every reading of a run, (n,). [m]."""
+    """Errors after every reading of a run, (n,); another label is other random numbers. [m]."""
     walk = recording.by_name[run]
-    track = tracked(estimator, recording, walk, seed)
+    track = tracked(estimator, recording, walk, seed, label)
     trajectory = truth.walks[run].trajectory
     return position_errors(walk.observations.readings, trajectory, track).error_m
 
 
-def tracked(estimator: Estimator, recording: Recording, walk: Walk, seed: int) -> Track:
+def tracked(
+    estimator: Estimator, recording: Recording, walk: Walk, seed: int, label: str = LABEL
+) -> Track:
     """Track of one run.
 
     Raises
@@ -104,7 +161,7 @@ def tracked(estimator: Estimator, recording: Recording, walk: Walk, seed: int) -
     learned = fit(estimator, recording)
     if isinstance(learned, Failure):
         raise DataError(f"aisle-graph: {learned.reason}")
-    track = follow(learned, recording.venue, walk, seed=seed, label=_LABEL)
+    track = follow(learned, recording.venue, walk, seed=seed, label=label)
     if isinstance(track, Failure):
         raise DataError(f"aisle-graph: {walk.name}: {track.reason}")
     return track

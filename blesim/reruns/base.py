@@ -1,5 +1,6 @@
 """What an experiment is: numbers of a seed, what was published of them, what should be less."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol
@@ -101,6 +102,33 @@ class Trial:
 
     numbers: Mapping[Key, float]
     pictures: tuple[Picture, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Change:
+    """An experiment with one thing otherwise, to see what hangs on it.
+
+    Attributes
+    ----------
+    name : str
+        What is otherwise, in a few words that begin a row of a table.
+    why : str
+        What the paper leaves open about it, or what it is to show; one sentence.
+    experiment : Experiment
+        With it.
+    shown : tuple of Key
+        The numbers to compare, which both experiments give.
+    """
+
+    name: str
+    why: str
+    experiment: "Experiment"
+    shown: tuple[Key, ...]
+
+    @property
+    def short_name(self) -> str:
+        """For a file: its name in small letters and digits."""
+        return "-".join(re.findall(r"[a-z0-9.]+", self.name.lower()))
 
 
 class Experiment(Protocol):

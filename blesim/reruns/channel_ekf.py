@@ -9,9 +9,10 @@ References
 .. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-separate-ekf".
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from math import hypot, sqrt
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from math import hypot, inf, sqrt
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ from blesim.ranging.survey_readings import WALKING, SurveyReadings, survey_readi
 from blesim.recording import Failure, Recording, Truth
 from blesim.reruns import channel_ekf_numbers as paper
 from blesim.reruns.base import Expected, Key, Numbers, Picture, Published, Trial
-from blesim.reruns.channel_ekf_numbers import FP, PM, PROPOSED
+from blesim.reruns.channel_ekf_numbers import DEPLOYMENTS, FP, PM, PROPOSED
 from blesim.reruns.channel_ekf_pictures import error_overview, office_pictures, ranging_pictures
 from blesim.reruns.channel_ekf_ranging import (
     DistanceErrors,
@@ -48,10 +49,11 @@ from blesim.tables import Track
 from blesim.venue.beacons import CHANNELS, Beacon
 from blesim.venue.venue import Venue
 
-_ESTIMATORS: Mapping[str, Estimator] = {
+# Fingerprints are of the points surveyed, as in the paper, not of what was heard between them.
+ESTIMATORS: Mapping[str, Estimator] = {
     PM: PathLossEkf(),
-    FP: FingerprintEkf(),
-    PROPOSED: ChannelEkf(),
+    FP: FingerprintEkf(cell_m=None),
+    PROPOSED: ChannelEkf(cell_m=None),
 }
 _PHONE_HEIGHT_M = ChannelEkf().phone_height_m
 _PHONE = "iphone-4s"
@@ -83,10 +85,29 @@ class Ranging:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelEkfExperiment:
-    """The experiment; stateless."""
+    """The experiment; stateless.
+
+    Attributes
+    ----------
+    values : mapping of str to object
+        Other values of both scenarios, by path, as in `blesim.scenario.other_values.laid_in`.
+    estimators : mapping of str to Estimator
+        What stands for each of the three methods; none to simulate the signals alone.
+    deployments : tuple of str
+        Offices to simulate. Figures 1 to 9 are of the dense one.
+    phone_held : bool
+        Whether somebody holds the phone of figure 1, or it lies there.
+    farthest_m : float
+        Calibration points of figures 5 to 8 farther from the beacon are left out. [m]
+    """
 
     paper: str = "channel-ekf"
     title: str = "polynomial ranges and fingerprints of each channel in an extended Kalman filter"
+    values: Mapping[str, Any] = field(default_factory=dict)
+    estimators: Mapping[str, Estimator] = field(default_factory=lambda: ESTIMATORS)
+    deployments: tuple[str, ...] = DEPLOYMENTS
+    phone_held: bool = False
+    farthest_m: float = inf
 
     @property
     def published(self) -> Sequence[Published]:
@@ -100,55 +121,69 @@ class ChannelEkfExperiment:
 
     def trial(self, seed: int, *, pictures: bool = False) -> Trial:
         """Numbers of one seed, and its pictures if asked for."""
-        offices = [visited(each, seed) for each in paper.DEPLOYMENTS]
-        survey = survey_readings(surveys_of(offices[0].recording))
-        ranging = Ranging(
-            still=still_readings(scenario_of("office-dense"), offices[0].truth.venue, seed),
-            distances=distances_of(survey, offices[0].recording),
-            places=place_errors(survey),
-        )
+        offices = [self.visited(each, seed) for each in self.deployments]
+        ranged = [self.ranged(each, seed) for each in offices if each.deployment == "dense"]
         positions = position_numbers(offices)
-        numbers = {**ranging_numbers(ranging), **positions, **headline(positions)}
+        numbers = {key: value for each in ranged for key, value in ranging_numbers(each).items()}
+        numbers |= {**positions, **headline(positions)}
         if not pictures:
             return Trial(numbers=numbers)
-        drawn = ranging_pictures(ranging.still, ranging.distances, ranging.places)
+        drawn = [
+            picture
+            for each in ranged
+            for picture in ranging_pictures(each.still, each.distances, each.places)
+        ]
         for office in offices:
             drawn += office_pictures(
                 office.deployment, office.recording, office.truth, office.tracks, office.errors
             )
         return Trial(numbers=numbers, pictures=tuple(drawn))
 
+    def visited(self, deployment: str, seed: int) -> Office:
+        """An office, surveyed, walked through, and positioned in by each method."""
+        file = scenario_of(f"office-{deployment}", self.values)
+        recording, truth = Simulation.run(file, seed).recording()
+        tracks, errors = {}, {}
+        for method, estimator in self.estimators.items():
+            learned = fit(estimator, recording)
+            if isinstance(learned, Failure):
+                raise DataError(f"{method}, seed {seed}: {learned.reason}")
+            for walk in scored_walks(recording):
+                track = follow(learned, recording.venue, walk, seed=seed, label=method)
+                if isinstance(track, Failure):
+                    raise DataError(f"{method} on {walk.name}, seed {seed}: {track.reason}")
+                tracks[method, walk.name] = track
+                errors[method, walk.name] = track_errors(recording, truth, walk, track)
+        return Office(
+            deployment=deployment, recording=recording, truth=truth, tracks=tracks, errors=errors
+        )
+
+    def ranged(self, office: Office, seed: int) -> Ranging:
+        """Signals, distances and places of the dense office, no filter."""
+        file = scenario_of("office-dense", self.values)
+        survey = survey_readings(surveys_of(office.recording))
+        distance_m = distances_from(office.recording)
+        near = survey.rows(distance_m(survey) <= self.farthest_m)
+        return Ranging(
+            still=still_readings(file, office.truth.venue, seed, held=self.phone_held),
+            distances=distance_errors(near, distance_m),
+            places=place_errors(survey),
+        )
+
     def overview(self, numbers: Mapping[Key, Numbers]) -> Sequence[Picture]:
         """90 % errors of the three methods, mean over the seeds, beside the published ones."""
         return error_overview(numbers)
 
 
-def visited(deployment: str, seed: int) -> Office:
-    """An office, surveyed, walked through, and positioned in by each method."""
-    file = scenario_of(f"office-{deployment}")
-    recording, truth = Simulation.run(file, seed).recording()
-    tracks, errors = {}, {}
-    for method, estimator in _ESTIMATORS.items():
-        learned = fit(estimator, recording)
-        if isinstance(learned, Failure):
-            raise DataError(f"{method}, seed {seed}: {learned.reason}")
-        for walk in scored_walks(recording):
-            track = follow(learned, recording.venue, walk, seed=seed, label=method)
-            if isinstance(track, Failure):
-                raise DataError(f"{method} on {walk.name}, seed {seed}: {track.reason}")
-            tracks[method, walk.name] = track
-            errors[method, walk.name] = track_errors(recording, truth, walk, track)
-    return Office(
-        deployment=deployment, recording=recording, truth=truth, tracks=tracks, errors=errors
-    )
-
-
-def still_readings(file: ScenarioFile, office: Venue, seed: int) -> SurveyReadings:
+def still_readings(
+    file: ScenarioFile, office: Venue, seed: int, *, held: bool = False
+) -> SurveyReadings:
     """Readings of the south wall's beacons by a phone that lies 5 m from each in turn: figure 1.
 
-    Spots are numbered like the beacons. Static is taken at its word: nobody holds the phone.
+    Spots are numbered like the beacons. Static is taken at its word: nobody holds the phone, unless
+    it is said to be held.
     """
-    lying = file.scenario.phones[_PHONE].model_copy(update={"held": False})
+    lying = file.scenario.phones[_PHONE].model_copy(update={"held": held})
     beacons = [(row, each) for row, each in enumerate(office.beacons) if each.id in _STILL_BEACONS]
     spots = tuple(_spot_beside(each, lying.height_m) for _, each in beacons)
     plan = SurveyPlan(name="still", phone=_PHONE, spots=spots, stand_s=_STILL_S)
@@ -165,9 +200,9 @@ def _spot_beside(beacon: Beacon, height_m: float) -> Spot:
     return Spot(x_m=beacon.x_m - sqrt(_STILL_M**2 - across_m**2), y_m=_AISLE_Y_M)
 
 
-def distances_of(survey: SurveyReadings, recording: Recording) -> DistanceErrors:
-    """Distance errors of a survey."""
-    return distance_errors(survey, survey.distance_m(recording.venue, _PHONE_HEIGHT_M))
+def distances_from(recording: Recording) -> Callable[[SurveyReadings], Numbers]:
+    """True distances of the readings of a survey, as its venue was surveyed. [m]."""
+    return lambda each: each.distance_m(recording.venue, _PHONE_HEIGHT_M)
 
 
 def ranging_numbers(ranging: Ranging) -> dict[Key, float]:
@@ -219,10 +254,14 @@ def _figures(errors: PositionErrors) -> tuple[float, ...]:
 def headline(positions: Mapping[Key, float]) -> dict[Key, float]:
     """90 % errors of both trajectories, and how far the proposed ones are below the others.
 
-    As in the abstract: the mean of two percentiles, and the mean of two reductions.
+    As in the abstract: the mean of two percentiles, and the mean of two reductions. Of the
+    deployments that were positioned in.
     """
     found = {}
-    for deployment in paper.DEPLOYMENTS:
+    trajectory, *_ = paper.TRAJECTORIES.values()
+    for deployment in DEPLOYMENTS:
+        if paper.error_key(deployment, trajectory, PROPOSED, paper.COLUMNS[1]) not in positions:
+            continue
         far_m = {
             method: np.array(
                 [

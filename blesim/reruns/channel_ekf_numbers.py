@@ -102,10 +102,9 @@ def _ranging() -> list[Published]:
         # A ratio of levels in dBm says nothing.
         mean = Published(key=still_key(channel, MEAN_RSSI), value=mean_dbm, compared=False)
         found += [mean, Published(key=still_key(channel, RSSI_SPREAD), value=spread_db)]
-    # The scenario's path loss was set by these two.
     found += [
         Published(key=LEVEL, value=-79.5891, compared=False),
-        Published(key=EXPONENT, value=1.2954, compared=False),
+        Published(key=EXPONENT, value=1.2954),
     ]
     printed = {
         spread_key("PM"): 3.8,
@@ -116,9 +115,10 @@ def _ranging() -> list[Published]:
     modes = (*CHANNEL_NAMES, AGGREGATE)
     printed |= zip(map(beacon_key, modes), (5.1, 5.2, 5.0, 6.3), strict=True)
     printed |= zip(map(place_key, modes), (6.9, 7.0, 7.0, 7.2), strict=True)
-    printed |= {heard_key("dense", FEWEST): 5.0, heard_key("dense", MOST): 19.0}
-    # No ratio can be formed with the first of these.
-    printed |= {heard_key("sparse", FEWEST): 0.0, heard_key("sparse", MOST): 9.0}
+    # How strong the scenario's beacons are was set by these.
+    heard = {heard_key("dense", FEWEST): 5.0, heard_key("dense", MOST): 19.0}
+    heard |= {heard_key("sparse", FEWEST): 0.0, heard_key("sparse", MOST): 9.0}
+    found += [Published(key=key, value=value, compared=False) for key, value in heard.items()]
     return found + [Published(key=key, value=value) for key, value in printed.items()]
 
 

@@ -5,16 +5,18 @@ References
 .. [1] Channel-separate regression, fingerprints and EKF, 2016; digest "channel-separate-ekf".
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blesim.ranging.channels import channel_slot
+from blesim.ranging.curves import ENOUGH_POINTS
 from blesim.ranging.path_loss_fit import fit_path_loss
 from blesim.ranging.polynomial_range import fit_polynomial_ranges
 from blesim.ranging.radio_map import MapLayout, RadioMap, channel_radio_maps, radio_map
-from blesim.ranging.survey_readings import SurveyReadings
+from blesim.ranging.survey_readings import SurveyReadings, calibration_points
 from blesim.reruns.channel_ekf_numbers import AGGREGATE, CHANNEL_NAMES, DEGREES, poly
 from blesim.tables import Readings
 from blesim.units import MICROSECONDS_PER_SECOND
@@ -26,9 +28,9 @@ Rows = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class DistanceErrors:
-    """How far the distances of n survey readings are off, by models fitted on the same readings.
+    """How far distances at calibration points are off, by models fitted on the same points.
 
-    The paper fits and tries its models on one set of readings as well.
+    The paper fits and tries its models on one set of points as well.
 
     Attributes
     ----------
@@ -36,7 +38,9 @@ class DistanceErrors:
         Row of the beacon; row of its channel, three a beacon.
     by_model : dict of str to ndarray of float64, (n,)
         Absolute error of the PM and the polynomials of each channel. [m]
-    aggregate : ndarray of float64, (n,)
+    aggregate_beacon : ndarray of int64, (m,)
+        Row of the beacon where channels are taken together.
+    aggregate : ndarray of float64, (m,)
         Of the polynomials of degree 2 of each beacon. [m]
     level_dbm, exponent : ndarray of float64, (beacons * 3,)
         PM of each channel. [dBm], [-]
@@ -45,35 +49,43 @@ class DistanceErrors:
     beacon: Rows
     channel: Rows
     by_model: dict[str, Array]
+    aggregate_beacon: Rows
     aggregate: Array
     level_dbm: Array
     exponent: Array
 
 
-def distance_errors(survey: SurveyReadings, distance_m: Array) -> DistanceErrors:
-    """Errors of distances from single readings; the survey tells channels.
+def distance_errors(
+    survey: SurveyReadings, distance_m: Callable[[SurveyReadings], Array]
+) -> DistanceErrors:
+    """Errors of distances from the mean RSSI at each point; the survey tells channels.
 
     Parameters
     ----------
     survey : SurveyReadings
-        n readings.
-    distance_m : ndarray of float64, (n,)
-        True as surveyed, in space. [m]
+        All readings.
+    distance_m : callable
+        True distances of readings in space, as surveyed, (n,). [m]
     """
-    of, rssi_dbm = (survey.beacon, survey.channel), survey.rssi_dbm
-    loss = fit_path_loss(survey, distance_m, by="beacon and channel")
-    by_model = {"PM": np.abs(loss.of(*of).distance_m(rssi_dbm) - distance_m)}
+    apart = calibration_points(survey, by_channel=True)
+    true_m, of = distance_m(apart), (apart.beacon, apart.channel)
+    loss = fit_path_loss(apart, true_m, by="beacon and channel", enough=ENOUGH_POINTS)
+    by_model = {"PM": np.abs(loss.of(*of).distance_m(apart.rssi_dbm) - true_m)}
     for degree in DEGREES:
-        curves = fit_polynomial_ranges(survey, distance_m, degree=degree)
-        by_model[poly(degree)] = np.abs(curves.of(*of).distance_m(rssi_dbm) - distance_m)
-    together = fit_polynomial_ranges(survey, distance_m, by="beacon")
+        curves = fit_polynomial_ranges(apart, true_m, degree=degree, enough=ENOUGH_POINTS)
+        by_model[poly(degree)] = np.abs(curves.of(*of).distance_m(apart.rssi_dbm) - true_m)
+    together = calibration_points(survey, by_channel=False)
+    whole_m = distance_m(together)
+    curves = fit_polynomial_ranges(together, whole_m, by="beacon", enough=ENOUGH_POINTS)
+    whole = curves.of(together.beacon, together.channel).distance_m(together.rssi_dbm)
     beacons = np.repeat(np.arange(survey.beacons), len(CHANNELS))
     each = loss.of(beacons, np.tile(CHANNELS, survey.beacons))
     return DistanceErrors(
-        beacon=survey.beacon,
-        channel=survey.beacon * len(CHANNELS) + channel_slot(survey.channel) - 1,
+        beacon=apart.beacon,
+        channel=apart.beacon * len(CHANNELS) + channel_slot(apart.channel) - 1,
         by_model=by_model,
-        aggregate=np.abs(together.of(*of).distance_m(rssi_dbm) - distance_m),
+        aggregate_beacon=together.beacon,
+        aggregate=np.abs(whole - whole_m),
         level_dbm=np.asarray(each.level_dbm),
         exponent=np.asarray(each.exponent),
     )
@@ -101,7 +113,7 @@ def beacon_errors(errors: DistanceErrors) -> dict[str, float]:
         name: far_error_m(errors.beacon[slot == row], separate[slot == row])
         for row, name in enumerate(CHANNEL_NAMES)
     }
-    return {**found, AGGREGATE: far_error_m(errors.beacon, errors.aggregate)}
+    return {**found, AGGREGATE: far_error_m(errors.aggregate_beacon, errors.aggregate)}
 
 
 def place_errors(survey: SurveyReadings) -> dict[str, Array]:

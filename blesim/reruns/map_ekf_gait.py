@@ -183,6 +183,35 @@ def known_walks(recording: Recording) -> list[KnownWalk]:
     return [_known(walk) for walk in recording.walks if walk.kind == WalkKind.SURVEY]
 
 
+def known_by_walkers(file: ScenarioFile, seed: int, *, same: bool) -> list[KnownWalk]:
+    """The walks of known length, with strengths of gait that are those of people, not of walks.
+
+    What is drawn for a walker hangs on the walk's name, so that the first walks of all people are
+    simulated under the people's names, then the second ones, and so on. On each walk the steps of a
+    person are then irregular in the same way.
+
+    Parameters
+    ----------
+    file, seed : ScenarioFile, int
+        What is simulated.
+    same : bool
+        Whether all people walk with the same strength; else those with the same gait do.
+    """
+    surveys = [plan for plan in file.scenario.walks if plan.kind == "survey"]
+    people = ["all" if same else plan.gait.model_dump_json() for plan in surveys]
+    earlier = [people[:row].count(person) for row, person in enumerate(people)]
+    known: dict[int, KnownWalk] = {}
+    for times in range(max(earlier) + 1):
+        rows = [row for row, before in enumerate(earlier) if before == times]
+        plans = tuple(
+            surveys[row].model_copy(update={"name": f"person-{people.index(people[row])}"})
+            for row in rows
+        )
+        recording, _ = Simulation.run(file.with_parameters(walks=plans), seed).recording()
+        known |= zip(rows, known_walks(recording), strict=True)
+    return [known[row] for row in range(len(surveys))]
+
+
 def _known(walk: Walk) -> KnownWalk:
     marks = walk.observations.marks
     way_m = float(np.hypot(np.diff(marks.x_m), np.diff(marks.y_m)).sum())

@@ -1,7 +1,7 @@
 """Headings and positions of the walk: tables 3 to 5 of the paper on map-compensated headings."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,8 +30,10 @@ _OHPDR, _AHPDR, _BEPDR, _EKFPDR = (
 # Eq 17 to the letter, beside the error-state filter that the paper names: it runs away.
 _KEPT = f"{_EKFPDR},errors=kept"
 KEPT_ROW = "EKFPDR, errors kept as Eq 17 reads"
-# Which beacons the solutions use, and by which estimator (paper, section 5).
-_TRIED = {
+# Estimators by the number of beacons in use and the solution.
+Tried = Mapping[int, Mapping[str, str]]
+# Paper, section 5.
+TRIED: Tried = {
     20: {"OHPDR": _OHPDR, "AHPDR": _AHPDR, "EKFPDR": _EKFPDR, KEPT_ROW: _KEPT},
     15: {"EKFPDR": _EKFPDR},
     10: {"EKFPDR": _EKFPDR},
@@ -40,16 +42,41 @@ _TRIED = {
 _LAYOUTS = {15: "campus-corridor-15", 10: "campus-corridor-10", 5: "campus-corridor-keys"}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Solving:
+    """How the walk is solved, and where its errors are looked at.
+
+    Attributes
+    ----------
+    tried : mapping of int to mapping of str to str
+        By the number of beacons, at least 20, estimators by solution.
+    start_off_m : float
+        How far off the walk is told to begin. [m]
+    every_steps : int
+        The error of the position is looked at after each so many steps. [-]
+    trained_steps : int
+        So many first straight steps of each corridor do not count in table 3. [-]
+    """
+
+    tried: Tried = field(default_factory=lambda: TRIED)
+    start_off_m: float = names.START_OFF_M
+    every_steps: int = 1
+    trained_steps: int = 0
+
+
+AS_PUBLISHED = Solving()
+
+
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Solved:
-    """One solution on the walk with k steps.
+    """One solution on the walk, whose error is looked at k times after the start.
 
     Attributes
     ----------
     track : Track
         Estimated.
     error_m : ndarray of float64, (k + 1,)
-        At the start and after each true step. [m]
+        At the start and after true steps. [m]
     """
 
     track: Track
@@ -86,7 +113,7 @@ class Solutions:
         return _start(self.walk)
 
 
-def solutions(file: ScenarioFile, seed: int) -> Solutions:
+def solutions(file: ScenarioFile, seed: int, solving: Solving = AS_PUBLISHED) -> Solutions:
     """The walk of one seed by all solutions.
 
     Raises
@@ -95,25 +122,29 @@ def solutions(file: ScenarioFile, seed: int) -> Solutions:
         If an estimator fails.
     """
     recording, truth = Simulation.run(file, seed).recording()
-    solved = dict(_solved(recording, truth, 20, seed))
-    for beacons, layout in _LAYOUTS.items():
-        source = VenueSource.model_validate({"layout": layout})
-        other = Simulation.run(file.with_parameters(venue=source), seed).recording()
-        solved |= dict(_solved(*other, beacons, seed))
+    solved: dict[tuple[str, int], Solved] = {}
+    for beacons in solving.tried:
+        known = recording, truth
+        if beacons in _LAYOUTS:
+            source = VenueSource.model_validate({"layout": _LAYOUTS[beacons]})
+            known = Simulation.run(file.with_parameters(venue=source), seed).recording()
+        solved |= dict(_solved(*known, beacons, seed, solving))
     return Solutions(
         recording=recording,
         truth=truth,
-        walk=misplaced(recording.by_name[_WALK], seed),
+        walk=misplaced(recording.by_name[_WALK], seed, solving.start_off_m),
         solved=solved,
     )
 
 
 def _solved(
-    recording: Recording, truth: Truth, beacons: int, seed: int
+    recording: Recording, truth: Truth, beacons: int, seed: int, solving: Solving
 ) -> Iterator[tuple[tuple[str, int], Solved]]:
-    walk, true = misplaced(recording.by_name[_WALK], seed), truth.walks[_WALK]
+    walk = misplaced(recording.by_name[_WALK], seed, solving.start_off_m)
+    true = truth.walks[_WALK]
     time_us = np.concatenate([true.trajectory.time_us[:1], true.steps.time_us])
-    for row, text in _TRIED[beacons].items():
+    time_us = time_us[:: solving.every_steps]
+    for row, text in solving.tried[beacons].items():
         label, estimator = make_estimator(text)
         fitted = fit(estimator, recording)
         if isinstance(fitted, Failure):
@@ -125,14 +156,14 @@ def _solved(
         yield (row, beacons), Solved(track=track, error_m=error_m)
 
 
-def misplaced(walk: Walk, seed: int) -> Walk:
-    """The walk whose first mark is 2 m off, any way: "the error accumulated from the initial 2 m".
+def misplaced(walk: Walk, seed: int, far_m: float = names.START_OFF_M) -> Walk:
+    """The walk whose first mark is off, any way: "the error accumulated from the initial 2 m".
 
     What comes after the first mark is not looked at.
     """
     marks = walk.observations.marks
     turn = Draws(seed=seed, purpose="start of the walk").uniforms(np.zeros(1, np.int64))[0, 0]
-    off_m = names.START_OFF_M * np.array([np.cos(2 * np.pi * turn), np.sin(2 * np.pi * turn)])
+    off_m = far_m * np.array([np.cos(2 * np.pi * turn), np.sin(2 * np.pi * turn)])
     first = np.arange(len(marks)) == 0
     marks = replace(marks, x_m=marks.x_m + first * off_m[0], y_m=marks.y_m + first * off_m[1])
     return replace(walk, observations=replace(walk.observations, marks=marks))
@@ -192,22 +223,26 @@ def heading_errors_deg(
     return time_us[straight], azimuth_deg[straight], off_deg
 
 
-def heading_numbers(found: Solutions) -> Iterator[tuple[Key, float]]:
-    """Numbers of table 3."""
+def heading_numbers(
+    found: Solutions, solving: Solving = AS_PUBLISHED
+) -> Iterator[tuple[Key, float]]:
+    """Numbers of table 3, of the solutions that were tried."""
     for solution, mean, most in (
         ("OHPDR", names.RAW_MEAN, names.RAW_MOST),
         ("AHPDR", names.MENDED_MEAN, names.MENDED_MOST),
     ):
+        if (solution, 20) not in found.solved:
+            continue
         _, azimuth_deg, off_deg = heading_errors_deg(found, solution)
         for each_deg in names.AZIMUTHS_DEG:
-            here_deg = np.abs(off_deg[azimuth_deg == each_deg])
+            here_deg = np.abs(off_deg[azimuth_deg == each_deg])[solving.trained_steps :]
             row = names.azimuth_row(each_deg)
             yield Key(names.HEADINGS, row, mean), float(here_deg.mean())
             yield Key(names.HEADINGS, row, most), float(here_deg.max())
 
 
 def position_numbers(found: Solutions) -> Iterator[tuple[Key, float]]:
-    """Numbers of tables 4 and 5."""
+    """Numbers of tables 4 and 5, of the solutions that were tried."""
     for (solution, beacons), solved in found.solved.items():
         if (solution, beacons) not in (("EKFPDR", 15), ("EKFPDR", 10)):
             yield from _summary(names.SOLUTIONS, solution, solved.error_m)

@@ -9,7 +9,8 @@ References
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,13 @@ from blesim.reruns import pdr_fingerprint_numbers as paper
 from blesim.reruns.base import Expected, Key, Numbers, Picture, Published, Trial
 from blesim.reruns.pdr_fingerprint_pictures import error_overview, pictures_of
 from blesim.reruns.sites import scenario_of
+from blesim.scenario.reading import NOTHING_ELSE
 from blesim.simulate import Simulation
 from blesim.tables import Track, Trajectory
 from blesim.units import to_us
 
 SCENARIO = "room-two-pairs"
+TakenAt = Literal["readings", "stands"]
 # The published defaults; the correction is switched on and off below.
 ESTIMATOR = PdrFingerprint()
 # The point (8, 9) of section 3.3.1, in our survey. The room is 8 cells of 0.6 m wide, so that the
@@ -53,10 +56,24 @@ class Room:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PdrFingerprintExperiment:
-    """The experiment; stateless."""
+    """The experiment; see `blesim.reruns.base.Experiment`.
 
-    paper: str = "pdr-fingerprint"
-    title: str = "dead reckoning and four-direction fingerprints in a Kalman filter"
+    Attributes
+    ----------
+    values : mapping of str to object
+        Laid into the scenario, by path; see `blesim.scenario.other_values`.
+    estimator : PdrFingerprint
+        Settings of the filter; the correction is switched on and off beside them.
+    taken_at : {"readings", "stands"}
+        Where the errors of table 3 are taken: after every reading of a walk, or only at the end of
+        each stand.
+    """
+
+    paper: ClassVar[str] = "pdr-fingerprint"
+    title: ClassVar[str] = "dead reckoning and four-direction fingerprints in a Kalman filter"
+    values: Mapping[str, Any] = field(default_factory=dict)
+    estimator: PdrFingerprint = ESTIMATOR
+    taken_at: TakenAt = "readings"
 
     @property
     def published(self) -> Sequence[Published]:
@@ -70,9 +87,9 @@ class PdrFingerprintExperiment:
 
     def trial(self, seed: int, *, pictures: bool = False) -> Trial:
         """Numbers of one seed, and its pictures if asked for."""
-        room = walked(seed)
+        room = walked(seed, self.values, self.estimator)
         point_dbm = point_signals_dbm(room.survey)
-        numbers = {**error_numbers(room), **signal_numbers(point_dbm)}
+        numbers = {**error_numbers(room, self.taken_at), **signal_numbers(point_dbm)}
         if not pictures:
             return Trial(numbers=numbers)
         drawn = pictures_of(room.recording, room.truth, room.tracks, room.errors, point_dbm)
@@ -83,18 +100,22 @@ class PdrFingerprintExperiment:
         return error_overview(numbers)
 
 
-def walked(seed: int) -> Room:
+def walked(
+    seed: int,
+    values: Mapping[str, Any] = NOTHING_ELSE,
+    estimator: PdrFingerprint = ESTIMATOR,
+) -> Room:
     """The room of one seed, both paths followed in both modes."""
-    recording, truth = Simulation.run(scenario_of(SCENARIO), seed).recording()
-    learned = ESTIMATOR.fit(recording.venue, surveys_of(recording))
+    recording, truth = Simulation.run(scenario_of(SCENARIO, values), seed).recording()
+    learned = estimator.fit(recording.venue, surveys_of(recording))
     if learned.survey is None:
         raise InvariantError("pdr-fingerprint was fitted, and knows no fingerprints")
     tracks, errors = {}, {}
     for mode in paper.MODES:
-        estimator = with_correction(learned, correction=mode == paper.WITH)
+        ready = with_correction(learned, correction=mode == paper.WITH)
         for path in paper.PATHS:
             walk = recording.by_name[path]
-            track = _followed(estimator, recording, path, seed)
+            track = _followed(ready, recording, path, seed)
             tracks[path, mode] = track
             errors[path, mode] = track_errors(recording, truth, walk, track)
     return Room(
@@ -116,14 +137,15 @@ def _followed(estimator: Estimator, recording: Recording, path: str, seed: int) 
     return track
 
 
-def error_numbers(room: Room) -> dict[Key, float]:
-    """Table 3 after every reading, and the mean and maximum at the ends of the stands alone."""
+def error_numbers(room: Room, taken_at: TakenAt = "readings") -> dict[Key, float]:
+    """Table 3, and the mean and maximum at the ends of the stands alone."""
     numbers = {}
     for (path, mode), errors in room.errors.items():
-        for statistic, value in statistics_of(errors.error_m).items():
-            numbers[paper.error_key(path, mode, statistic)] = value
         end_us = stand_ends_us(room.truth.walks[path].trajectory, ESTIMATOR.still_s)
         at_ends = statistics_of(errors_at_m(errors, end_us))
+        told = at_ends if taken_at == "stands" else statistics_of(errors.error_m)
+        for statistic, value in told.items():
+            numbers[paper.error_key(path, mode, statistic)] = value
         for statistic in (paper.MAX, paper.MEAN):
             numbers[paper.stand_key(path, mode, statistic)] = at_ends[statistic]
     return numbers

@@ -9,7 +9,8 @@ References
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,11 @@ from blesim.estimators.trilateration_particle_filter import TrilaterationParticl
 from blesim.recording import Failure, Recording, Truth, Walk, WalkTruth
 from blesim.reruns.base import Expected, Key, Numbers, Picture, Published, Trial
 from blesim.reruns.proximity_pf_cells import cells_of, numbers_of_cells
+from blesim.reruns.proximity_pf_given import (
+    with_near_by_chance,
+    with_true_headings,
+    without_survey,
+)
 from blesim.reruns.proximity_pf_numbers import (
     ALGORITHMS,
     CHOSEN_PENALTY,
@@ -51,24 +57,43 @@ from blesim.tables import Track
 from blesim.units import to_us
 
 # Steps from the peaks and valleys of the acceleration, headings from the compass, as in the paper.
-_OURS = ProximityParticleFilter(source="imu", penalty=CHOSEN_PENALTY)
-_TRILATERATION = TrilaterationParticleFilter(source="imu", penalty=CHOSEN_PENALTY)
-_ESTIMATORS: dict[str, Estimator] = {
-    A: _TRILATERATION,
-    B: replace(_TRILATERATION, use_map=False),
-    C: replace(_OURS, use_map=False),
-    OURS: _OURS,
-}
+PROXIMITY = ProximityParticleFilter(source="imu", penalty=CHOSEN_PENALTY)
+TRILATERATION = TrilaterationParticleFilter(source="imu", penalty=CHOSEN_PENALTY)
 # Between the starts of two walks, each of which takes 74 s.
 _APART_S = 100.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProximityExperiment:
-    """The proximity paper."""
+    """The proximity paper.
+
+    Attributes
+    ----------
+    paper, title : str
+        What it is called.
+    values : mapping of str to object
+        What stands in place of the scenario's own, by path.
+    proximity : ProximityParticleFilter
+        The proposed algorithm; without the map it is C.
+    trilateration : TrilaterationParticleFilter
+        A; without the map it is B.
+    surveyed : bool
+        Whether the algorithms learn from the survey.
+    true_headings : bool
+        Whether the phone's step events have the true headings, for algorithms with these events as
+        their source.
+    near_by_chance : bool
+        Whether each reading tells Near with the probability of Eq 5, and not as the phone did.
+    """
 
     paper: str = "proximity-pf"
     title: str = "Particle filter on beacon proximity and a floor map"
+    values: Mapping[str, Any] = field(default_factory=dict)
+    proximity: ProximityParticleFilter = PROXIMITY
+    trilateration: TrilaterationParticleFilter = TRILATERATION
+    surveyed: bool = True
+    true_headings: bool = False
+    near_by_chance: bool = False
 
     @property
     def published(self) -> Sequence[Published]:
@@ -80,6 +105,16 @@ class ProximityExperiment:
         """Table I, and the footnote on the penalty."""
         return expected()
 
+    @property
+    def algorithms(self) -> Mapping[str, Estimator]:
+        """Those of table I by their names."""
+        return {
+            A: self.trilateration,
+            B: replace(self.trilateration, use_map=False),
+            C: replace(self.proximity, use_map=False),
+            OURS: self.proximity,
+        }
+
     def trial(self, seed: int, *, pictures: bool = False) -> Trial:
         """Numbers of one seed, pictures if asked for.
 
@@ -88,16 +123,20 @@ class ProximityExperiment:
         DataError
             If an estimator fails.
         """
-        file = five_trials(scenario_of("h-floor"))
+        file = five_trials(scenario_of("h-floor", self.values))
         recording, truth = Simulation.run(file, seed).recording()
-        walked = {name: _walked(recording, each, seed) for name, each in _ESTIMATORS.items()}
+        given = self._given(recording, truth, seed)
+        walked = {name: _walked(given, each, seed) for name, each in self.algorithms.items()}
         errors_m = {
             name: read_out_errors_m(file, recording, truth, tracks)
             for name, tracks in walked.items()
         }
         cells = cells_of(surveys_of(recording), recording.venue)
         numbers = numbers_of_cells(cells) | numbers_of_table(errors_m)
-        numbers |= _numbers_of_penalties(file, recording, truth, seed, errors_m[OURS])
+        for penalty in PENALTIES:
+            tracks = _walked(given, replace(self.proximity, penalty=penalty), seed)
+            with_it_m = read_out_errors_m(file, recording, truth, tracks)
+            numbers[penalty_key(penalty)] = float(np.mean(with_it_m))
         if not pictures:
             return Trial(numbers=numbers)
         first = Walked(
@@ -107,6 +146,14 @@ class ProximityExperiment:
             read_out_us=read_out_us(file, recording, recording.by_name[_name(1)]),
         )
         return Trial(numbers=numbers, pictures=trial_pictures(numbers, cells, first))
+
+    def _given(self, recording: Recording, truth: Truth, seed: int) -> Recording:
+        """What the algorithms are given."""
+        if self.true_headings:
+            recording = with_true_headings(recording, truth)
+        if self.near_by_chance:
+            recording = with_near_by_chance(recording, truth, seed)
+        return recording if self.surveyed else without_survey(recording)
 
     def overview(self, numbers: Mapping[Key, Numbers]) -> Sequence[Picture]:
         """P(d), errors and penalties over all seeds."""
@@ -217,24 +264,6 @@ def numbers_of_table(errors_m: Mapping[str, NDArray[np.float64]]) -> dict[Key, f
     for algorithm in (A, B, C):
         share = ours_m / numbers[summary_key(algorithm, MEAN)]
         numbers[less_key(algorithm)] = 100.0 * (1.0 - share)
-    return numbers
-
-
-def _numbers_of_penalties(
-    file: ScenarioFile,
-    recording: Recording,
-    truth: Truth,
-    seed: int,
-    chosen_m: NDArray[np.float64],
-) -> dict[Key, float]:
-    """Mean error with each penalty; that of the chosen one is already there."""
-    numbers: dict[Key, float] = {}
-    for penalty in PENALTIES:
-        errors_m = chosen_m
-        if penalty != CHOSEN_PENALTY:
-            tracks = _walked(recording, replace(_OURS, penalty=penalty), seed)
-            errors_m = read_out_errors_m(file, recording, truth, tracks)
-        numbers[penalty_key(penalty)] = float(np.mean(errors_m))
     return numbers
 
 

@@ -1,7 +1,7 @@
 """Experiments over many seeds, shared by processes, resumed where they stopped."""
 
 import hashlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,15 +10,21 @@ import numpy as np
 
 from blesim import __version__
 from blesim.errors import DataError, UsageError
-from blesim.reruns.base import Experiment, Key, Picture
-from blesim.reruns.registry import experiment_of
+from blesim.reruns.base import Experiment, Key, Numbers, Picture
+from blesim.reruns.registry import change_of, changes_of, experiment_of
 from blesim.reruns.sites import scenario_files
-from blesim.reruns.statistics import Figure, Ordering, figures_of, orderings_of, stacked
-from blesim.reruns.trials_on_disk import TrialStore
+from blesim.reruns.statistics import (
+    Changed,
+    Figure,
+    Ordering,
+    changed_of,
+    figures_of,
+    orderings_of,
+    stacked,
+)
+from blesim.reruns.trials_on_disk import Task, TrialStore
 from blesim.workers import shared
 
-# A trial: the short name of the paper, and the seed.
-Task = tuple[str, int]
 FIRST_SEED = 1
 _CONNECT_S = 10
 
@@ -32,10 +38,13 @@ class Rerun:
     figures: tuple[Figure, ...]
     orderings: tuple[Ordering, ...]
     pictures: tuple[Picture, ...]
+    changed: tuple[Changed, ...] = ()
 
 
-def tasks_of(papers: Sequence[str], seeds: int) -> list[Task]:
+def tasks_of(papers: Sequence[str], seeds: int, *, what_if: bool = False) -> list[Task]:
     """All trials: the first seed of every paper first, so that faults show early.
+
+    With `what_if` those with one thing otherwise too, after all the others.
 
     Raises
     ------
@@ -44,9 +53,21 @@ def tasks_of(papers: Sequence[str], seeds: int) -> list[Task]:
     """
     if seeds < 1:
         raise UsageError(f"seeds {seeds}: at least one is needed")
-    for paper in papers:
-        experiment_of(paper)
-    return [(paper, FIRST_SEED + number) for number in range(seeds) for paper in papers]
+    batches = [[(experiment_of(paper).paper, "") for paper in papers]]
+    if what_if:
+        batches.append(
+            [(paper, change.short_name) for paper in papers for change in changes_of(paper)]
+        )
+    return [
+        Task(paper, seed, change)
+        for batch in batches
+        for seed in _seeds(seeds)
+        for paper, change in batch
+    ]
+
+
+def _seeds(count: int) -> range:
+    return range(FIRST_SEED, FIRST_SEED + count)
 
 
 def trials(
@@ -56,7 +77,7 @@ def trials(
 
     Parameters
     ----------
-    tasks : sequence of (str, int)
+    tasks : sequence of Task
         From `tasks_of`.
     store : TrialStore
         Where they are kept.
@@ -72,7 +93,7 @@ def trials(
     """
     left = []
     for task in tasks:
-        if store.load(*task) is None:
+        if store.load(task) is None:
             left.append(task)
         else:
             yield task
@@ -87,7 +108,7 @@ def _saved(
     tasks: Sequence[Task], results: Iterable[dict[Key, float]], store: TrialStore
 ) -> Generator[Task, None, None]:
     for task, numbers in zip(tasks, results, strict=True):
-        store.save(*task, numbers)
+        store.save(task, numbers)
         yield task
 
 
@@ -110,27 +131,25 @@ def _experimenter() -> Callable[[Task], dict[Key, float]]:
 
 
 def _numbers(task: Task) -> dict[Key, float]:
-    paper, seed = task
-    return dict(experiment_of(paper).trial(seed).numbers)
+    experiment = experiment_of(task.paper)
+    if task.change:
+        experiment = change_of(task.paper, task.change).experiment
+    return dict(experiment.trial(task.seed).numbers)
 
 
-def summarised(paper: str, seeds: int, store: TrialStore, *, pictures: bool = True) -> Rerun:
+def summarised(
+    paper: str, seeds: int, store: TrialStore, *, pictures: bool = True, what_if: bool = False
+) -> Rerun:
     """An experiment whose trials are all done, beside what was published.
 
     Raises
     ------
     DataError
-        If a trial is missing or gave no number for something published.
+        If a trial is missing or gave no number for something published or compared.
     """
     experiment = experiment_of(paper)
-    found = [store.load(paper, FIRST_SEED + number) for number in range(seeds)]
-    done = [numbers for numbers in found if numbers is not None]
-    if len(done) < seeds:
-        raise DataError(f"{store.folder}: {seeds - len(done)} trials of {paper} are missing")
-    numbers = stacked(done)
-    missing = [each.key for each in experiment.published if each.key not in numbers]
-    if missing:
-        raise DataError(f"{paper}: no trial gave {', '.join(map(' / '.join, missing))}")
+    published = [each.key for each in experiment.published]
+    numbers = _numbers_of([Task(paper, seed) for seed in _seeds(seeds)], published, store)
     drawn = experiment.trial(FIRST_SEED, pictures=True).pictures if pictures else ()
     return Rerun(
         experiment=experiment,
@@ -138,7 +157,32 @@ def summarised(paper: str, seeds: int, store: TrialStore, *, pictures: bool = Tr
         figures=figures_of(experiment, numbers),
         orderings=orderings_of(experiment, numbers),
         pictures=(*drawn, *(experiment.overview(numbers) if pictures else ())),
+        changed=tuple(_changed(experiment, numbers, seeds, store)) if what_if else (),
     )
+
+
+def _numbers_of(
+    tasks: Sequence[Task], wanted: Sequence[Key], store: TrialStore
+) -> Mapping[Key, Numbers]:
+    """What trials gave, by key, (seeds,)."""
+    found = [store.load(task) for task in tasks]
+    done = [numbers for numbers in found if numbers is not None]
+    what = " / ".join(filter(None, (tasks[0].paper, tasks[0].change)))
+    if len(done) < len(tasks):
+        raise DataError(f"{store.folder}: {len(tasks) - len(done)} trials of {what} are missing")
+    numbers = stacked(done)
+    missing = [key for key in wanted if key not in numbers]
+    if missing:
+        raise DataError(f"{what}: no trial gave {', '.join(map(' / '.join, missing))}")
+    return numbers
+
+
+def _changed(
+    experiment: Experiment, numbers: Mapping[Key, Numbers], seeds: int, store: TrialStore
+) -> Iterator[Changed]:
+    for change in changes_of(experiment.paper):
+        tasks = [Task(experiment.paper, seed, change.short_name) for seed in _seeds(seeds)]
+        yield changed_of(change, numbers, _numbers_of(tasks, change.shown, store))
 
 
 def version_text() -> str:

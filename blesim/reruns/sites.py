@@ -1,13 +1,15 @@
 """The scenarios of the papers, wherever blesim is installed."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from blesim.errors import DataError
-from blesim.scenario.reading import ScenarioFile, read_scenario
+from blesim.scenario.reading import NOTHING_ELSE, ScenarioFile, read_scenario
 
 
-def scenario_of(name: str) -> ScenarioFile:
-    """The scenario of that name, such as ``wholesale-section``.
+def scenario_of(name: str, values: Mapping[str, Any] = NOTHING_ELSE) -> ScenarioFile:
+    """The scenario of that name, such as ``wholesale-section``, with other values at some paths.
 
     Raises
     ------
@@ -17,7 +19,7 @@ def scenario_of(name: str) -> ScenarioFile:
     path = _folder() / f"{name}.yaml"
     if not path.is_file():
         raise DataError(f"scenario '{name}' is not in this installation; install blesim again")
-    return read_scenario(path)
+    return read_scenario(path, values)
 
 
 def scenario_files() -> list[Path]:

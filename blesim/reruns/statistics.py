@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from blesim.reruns.base import Expected, Experiment, Key, Numbers
+from blesim.reruns.base import Change, Expected, Experiment, Key, Numbers
 
 CONFIDENCE = 0.95
 # A figure agrees if neither is more than so many times the other.
@@ -88,6 +88,66 @@ class Ordering:
         """Whether ours has the published sign; where there is no number, better is less."""
         published = -1.0 if self.published_difference is None else self.published_difference
         return bool(self.simulated_difference * published > 0)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangedFigure:
+    """A number with one thing otherwise, beside what it is without.
+
+    Attributes
+    ----------
+    key : Key
+    simulated, low, high : float
+        Mean over the seeds, and its 95 % confidence interval.
+    difference, difference_low, difference_high : float
+        To the experiment as it is, seed by seed.
+    """
+
+    key: Key
+    simulated: float
+    low: float
+    high: float
+    difference: float
+    difference_low: float
+    difference_high: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Changed:
+    """What a change did to the numbers it shows."""
+
+    change: Change
+    figures: tuple[ChangedFigure, ...]
+
+
+def changed_of(
+    change: Change, numbers: Mapping[Key, Numbers], otherwise: Mapping[Key, Numbers]
+) -> Changed:
+    """What a change did.
+
+    Parameters
+    ----------
+    change : Change
+        Which.
+    numbers, otherwise : mapping of Key to ndarray of float64, (seeds,)
+        What the same seeds gave without and with it.
+    """
+    figures = []
+    for key in change.shown:
+        mean, low, high = interval(otherwise[key])
+        difference, difference_low, difference_high = interval(otherwise[key] - numbers[key])
+        figures.append(
+            ChangedFigure(
+                key=key,
+                simulated=mean,
+                low=low,
+                high=high,
+                difference=difference,
+                difference_low=difference_low,
+                difference_high=difference_high,
+            )
+        )
+    return Changed(change=change, figures=tuple(figures))
 
 
 def figures_of(experiment: Experiment, numbers: Mapping[Key, Numbers]) -> tuple[Figure, ...]:

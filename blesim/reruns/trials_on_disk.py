@@ -4,10 +4,19 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from blesim.errors import DataError
 from blesim.reruns.base import Key
 from blesim.whole_file import write_whole
+
+
+class Task(NamedTuple):
+    """A trial: of which paper, with which seed, and with what otherwise (nothing if empty)."""
+
+    paper: str
+    seed: int
+    change: str = ""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,7 +34,7 @@ class TrialStore:
     folder: Path
     version: str
 
-    def load(self, paper: str, seed: int) -> dict[Key, float] | None:
+    def load(self, task: Task) -> dict[Key, float] | None:
         """Numbers of a trial; none if it has not been done with this version.
 
         Raises
@@ -33,7 +42,7 @@ class TrialStore:
         DataError
             If the file is damaged.
         """
-        path = self._path(paper, seed)
+        path = self._path(task)
         try:
             told = json.loads(path.read_text(encoding="utf-8"))
         except FileNotFoundError:
@@ -44,13 +53,12 @@ class TrialStore:
             return None
         return {Key(*each["key"]): _number(each["value"]) for each in told["numbers"]}
 
-    def save(self, paper: str, seed: int, numbers: Mapping[Key, float]) -> None:
+    def save(self, task: Task, numbers: Mapping[Key, float]) -> None:
         """Write the numbers of a trial, whole or not at all."""
-        path = self._path(paper, seed)
+        path = self._path(task)
         path.parent.mkdir(parents=True, exist_ok=True)
         told = {
-            "paper": paper,
-            "seed": seed,
+            **task._asdict(),
             "version": self.version,
             "numbers": [
                 {"key": list(key), "value": value if value == value else None}
@@ -59,8 +67,9 @@ class TrialStore:
         }
         write_whole(path, (json.dumps(told, indent=1) + "\n").encode())
 
-    def _path(self, paper: str, seed: int) -> Path:
-        return self.folder / "trials" / paper / f"seed-{seed:04d}.json"
+    def _path(self, task: Task) -> Path:
+        folder = self.folder / "trials" / task.paper / task.change
+        return folder / f"seed-{task.seed:04d}.json"
 
 
 def _number(value: float | None) -> float:

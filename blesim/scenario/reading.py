@@ -2,10 +2,11 @@
 
 import json
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from pydantic import ValidationError
@@ -13,8 +14,10 @@ from pydantic import ValidationError
 from blesim.errors import ScenarioError
 from blesim.scenario.document import Document, read_document
 from blesim.scenario.model import Scenario
+from blesim.scenario.other_values import laid_in
 from blesim.settings import shortened
 
+NOTHING_ELSE: Mapping[str, Any] = MappingProxyType({})
 _FIRST_WORD = re.compile(r"(\w+)(?:: | (?='))")
 # Where pydantic speaks of Python and of JSON, a scenario has lists and mappings.
 _COUNTS = {"too_short": "min_length", "too_long": "max_length"}
@@ -69,13 +72,16 @@ class ScenarioFile:
         return self._document.fault(location, message)
 
 
-def read_scenario(path: Path) -> ScenarioFile:
+def read_scenario(path: Path, values: Mapping[str, Any] = NOTHING_ELSE) -> ScenarioFile:
     """The scenario of a file.
 
     Parameters
     ----------
     path : Path
         YAML 1.2.
+    values : mapping of str to object
+        What stands in place of the file's own, by path, as in ``{"radio.fading.model": "none"}``;
+        see `blesim.scenario.other_values`. The scenario's text says so in a last line.
 
     Returns
     -------
@@ -84,7 +90,7 @@ def read_scenario(path: Path) -> ScenarioFile:
     Raises
     ------
     ScenarioError
-        With a line ``file:line: path: message`` for every fault of the file.
+        With a line ``file:line: path: message`` for every fault of the file and of the values.
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -95,7 +101,19 @@ def read_scenario(path: Path) -> ScenarioFile:
     document = read_document(path, text)
     if not isinstance(document.value, dict):
         raise ScenarioError(f"{path}:1: a scenario is a mapping that begins with 'title:'")
+    if values:
+        text += f"# changed from {path.name}: {json.dumps(dict(values))}\n"
+        document = _with_values(document, values)
     return ScenarioFile(path=path, text=text, scenario=_checked(document))
+
+
+def _with_values(document: Document, values: Mapping[str, Any]) -> Document:
+    try:
+        return replace(document, value=laid_in(document.value, values))
+    except KeyError as unknown:
+        raise ScenarioError(
+            f"{document.path}: {unknown.args[0]}: leads to nothing that this scenario has"
+        ) from None
 
 
 def _checked(document: Document) -> Scenario:

@@ -1,33 +1,41 @@
 """The aisle-graph experiment: every printed number is simulated, by methods worked by hand."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from blesim.report.picture_figure import draw
-from blesim.reruns.aisle_graph import EXPERIMENT
+from blesim.reruns.aisle_graph import EXPERIMENT, AisleGraph, reshelved
+from blesim.reruns.aisle_graph_changes import CHANGES
 from blesim.reruns.aisle_graph_numbers import (
     FILTER,
     NEAREST,
+    OTHER,
     PAIR,
+    SAME,
     chosen_key,
     error_key,
+    exponent_key,
     parameters_of,
     particles_key,
     welch_key,
 )
 from blesim.reruns.aisle_graph_search import (
+    LABEL,
     beacon_pairs,
     best_of,
     errors_m,
     nearest_averaged,
     nearest_highest,
     particle_filters,
+    printed,
 )
 from blesim.reruns.aisle_graph_signals import AisleSignals, bump, fitted_exponent, mean_curve
 from blesim.reruns.aisle_graph_significance import clustered, welch
+from blesim.reruns.registry import change_of
 from blesim.reruns.sites import scenario_of
 from blesim.simulate import Simulation
 
@@ -180,3 +188,59 @@ def test_bins_with_few_readings_are_left_out():
     signals = AisleSignals(distance_m=distance_m, rssi_dbm=np.full(len(distance_m), -80.0))
     assert mean_curve(signals)[0].tolist() == [2.5]
     assert len(signals.within((3, 4))) == 9
+
+
+def changed(name):
+    """An experiment with one thing otherwise, without its search."""
+    return replace(change_of("aisle-graph", name).experiment, grids=printed)
+
+
+@pytest.fixture(scope="module")
+def unsearched():
+    return AisleGraph(grids=printed).trial(1).numbers
+
+
+def test_changes_give_the_numbers_that_they_show(unsearched):
+    for change in CHANGES:
+        assert set(change.shown) <= set(unsearched)
+    assert EXPERIMENT.grids().keys() == printed().keys()
+    methods = change_of("aisle-graph", "half-the-spread").experiment.grids()
+    assert {"500 particles", NEAREST, PAIR} < set(methods) < set(printed())
+
+
+def test_without_a_search_the_printed_parameters_are_chosen(unsearched):
+    told = {each.key: each.value for each in EXPERIMENT.published}
+    for row in printed():
+        for name in parameters_of(row):
+            assert unsearched[chosen_key(row, name)] == told[chosen_key(row, name)]
+
+
+def test_a_deaf_phone_flattens_the_curves_that_a_steeper_air_steepens(unsearched):
+    deaf, both = (
+        changed(name).trial(1).numbers for name in ("deaf-phone-alone", "deaf-phone-steeper-air")
+    )
+    for where in (SAME, OTHER):
+        key = exponent_key(where)
+        assert deaf[key] < unsearched[key] - 0.1
+        assert both[key] == pytest.approx(unsearched[key], abs=0.1)
+
+
+def test_shelves_of_another_material_weaken_other_aisles_alone(simulated, unsearched):
+    change = changed("shelves-of-liquids-or-metal")
+    before = simulated[0].venue
+    after = reshelved(before, change.shelves)
+    assert {each.loss.crossing_db for each in before.floor_plan.obstacles} == {3.0}
+    assert {each.loss.crossing_db for each in after.floor_plan.obstacles} == {9.0}
+    assert replace(after, floor_plan=before.floor_plan) == before
+    weaker = change.trial(1).numbers
+    same, other = exponent_key(SAME), exponent_key(OTHER)
+    assert weaker[same] == pytest.approx(unsearched[same], abs=0.02)
+    assert weaker[other] > unsearched[other] + 0.15
+
+
+def test_other_random_numbers_move_the_filter_alone(simulated):
+    again = f"{LABEL} again"
+    for method, (estimator,) in printed().items():
+        twice = [errors_m(estimator, *simulated, "run-2", 1, label) for label in (LABEL, again)]
+        drawn = "particles" in method
+        assert np.array_equal(*twice) is not drawn

@@ -1,6 +1,7 @@
 """The rerun of the paper on map-compensated headings: its sums by hand, its numbers complete."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,12 +9,29 @@ import pytest
 
 import blesim
 from blesim.estimators.base import StartInfo, make_track
+from blesim.pdr.step_length import Weinberg
 from blesim.reruns import map_ekf, map_ekf_numbers
 from blesim.reruns.base import Key
-from blesim.reruns.map_ekf_gait import THRESHOLDS_S, best_range, off_summary
+from blesim.reruns.map_ekf_changes import CHANGES
+from blesim.reruns.map_ekf_gait import (
+    THRESHOLDS_S,
+    best_range,
+    known_by_walkers,
+    known_walks,
+    off_summary,
+)
 from blesim.reruns.map_ekf_numbers import EXPECTED, PUBLISHED
-from blesim.reruns.map_ekf_walk import KEPT_ROW, errors_m, misplaced, step_headings
-from blesim.reruns.registry import experiment_of
+from blesim.reruns.map_ekf_walk import (
+    KEPT_ROW,
+    TRIED,
+    Solving,
+    errors_m,
+    heading_errors_deg,
+    heading_numbers,
+    misplaced,
+    solutions,
+    step_headings,
+)
 from blesim.reruns.sites import scenario_of
 from blesim.simulate import Simulation
 from blesim.tables import Trajectory
@@ -24,10 +42,8 @@ SECOND = 1_000_000
 @pytest.fixture(scope="module")
 def trials():
     # One walk instead of ten: what is asked here does not hang on their number.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(map_ekf, "_WALKS", 1)
-        experiment = experiment_of("map-ekf")
-        return experiment.trial(1, pictures=True), experiment.trial(1)
+    experiment = map_ekf.MapEkf(walks=1)
+    return experiment.trial(1, pictures=True), experiment.trial(1)
 
 
 def straight_walk():
@@ -173,6 +189,76 @@ class TestTrial:
         assert len(set(map_ekf.seeds_of(1)) | set(map_ekf.seeds_of(2))) == 20
 
 
+class TestChanges:
+    def test_show_what_the_experiment_gives(self, trials):
+        for change in CHANGES:
+            assert trials[0].numbers.keys() >= set(change.shown), change.name
+
+    @pytest.mark.parametrize(
+        "name", ["four people", "corridors within 20 degrees", "errors every 15 steps"]
+    )
+    def test_give_what_they_show(self, name):
+        change = next(each for each in CHANGES if each.name == name)
+        numbers = replace(change.experiment, walks=1).trial(1).numbers
+        assert numbers.keys() >= set(change.shown)
+
+    def test_walks_of_one_strength_and_height_have_one_coefficient(self):
+        file = scenario_of("campus-corridor", {"walks.*.gait": {"length_at_rest_m": 0.142}})
+        recording, _ = Simulation.run(file, 1).recording()
+        own = known_walks(recording)
+        same = known_by_walkers(file, 1, same=False)
+        assert [walk.distance_m for walk in same] == [walk.distance_m for walk in own]
+        assert np.ptp(coefficients(same)) < 0.5 * np.ptp(coefficients(own))
+
+    def test_people_are_told_apart_by_their_gait(self):
+        file = scenario_of("campus-corridor")
+        by_person, alike = (known_by_walkers(file, 1, same=same) for same in (False, True))
+        # Strengths belong to names: the first walk's person is the first of all.
+        assert np.array_equal(by_person[0].features.period_s, alike[0].features.period_s)
+        assert np.ptp(coefficients(alike)) < np.ptp(coefficients(by_person))
+
+    def test_fewer_looks_are_some_of_all_and_an_exact_start_has_no_error(self):
+        file = scenario_of("campus-corridor")
+        tried = {20: {"OHPDR": TRIED[20]["OHPDR"]}}
+        often, seldom, exact = (
+            solutions(file, 1, solving).solved["OHPDR", 20].error_m
+            for solving in (
+                Solving(tried=tried),
+                Solving(tried=tried, every_steps=15),
+                Solving(tried=tried, start_off_m=0.0),
+            )
+        )
+        assert np.array_equal(seldom, often[::15])
+        assert often[0] == pytest.approx(2.0, abs=1e-5)
+        assert exact[0] == 0.0
+
+    def test_steps_of_training_can_be_left_out(self):
+        file = scenario_of("campus-corridor")
+        tried = {20: {name: TRIED[20][name] for name in ("OHPDR", "AHPDR")}}
+        found = solutions(file, 1, Solving(tried=tried))
+        _, azimuth_deg, off_deg = heading_errors_deg(found, "AHPDR")
+        told = dict(heading_numbers(found, Solving(trained_steps=10)))
+        later_deg = np.abs(off_deg[azimuth_deg == 180])[10:]
+        assert told["table 3", "180 deg", "compensated, mean [deg]"] == later_deg.mean()
+
+    def test_values_reach_the_scenario(self):
+        key = Key("table 3", "270 deg", "raw, mean [deg]")
+        tried = {20: {"OHPDR": TRIED[20]["OHPDR"]}}
+        no_steel = {"magnetics.anomaly_ut": 0.0, "magnetics.clutter_ut": 0.0}
+        usual, clean = (
+            map_ekf.MapEkf(values=values, solving=Solving(tried=tried), walks=3)
+            .trial(1)
+            .numbers[key]
+            for values in ({}, no_steel)
+        )
+        assert clean < 0.7 * usual
+
+
+def coefficients(walks):
+    """K of Eq 8 that each walk alone would give."""
+    return [walk.distance_m / Weinberg(k=1.0).terms(walk.features)[0].sum() for walk in walks]
+
+
 def test_thresholds_are_hundredths():
     assert THRESHOLDS_S[14] == 0.14
 
@@ -180,5 +266,7 @@ def test_thresholds_are_hundredths():
 def test_the_page_is_there_and_names_its_experiments():
     page = Path(blesim.__file__).parent / "docs" / "reruns" / "map-ekf.md"
     text = page.read_text(encoding="utf-8")
-    for table in ("Table 1", "Table 2", "Table 3", "Table 4", "Table 5"):
-        assert table in text
+    for table in ("table 1", "table 2", "table 3", "table 4", "table 5"):
+        assert table in text.lower()
+    for change in CHANGES:
+        assert f'"{change.name}"' in text

@@ -1,16 +1,20 @@
 """The rerun of table 3: its arithmetic by hand, and one seed."""
 
+import re
+from dataclasses import replace
 from functools import cache
+from importlib.resources import files
 
 import numpy as np
 import pytest
 
 from blesim.metrics.position_error import PositionErrors
 from blesim.reruns import pdr_fingerprint_numbers as paper
-from blesim.reruns.base import Trial
+from blesim.reruns.base import Key, Trial
 from blesim.reruns.pdr_fingerprint import (
     EXPERIMENT,
     POINT_M,
+    PdrFingerprintExperiment,
     Room,
     error_numbers,
     errors_at_m,
@@ -20,7 +24,9 @@ from blesim.reruns.pdr_fingerprint import (
     statistics_of,
     walked,
 )
+from blesim.reruns.pdr_fingerprint_changes import CHANGES
 from blesim.reruns.pdr_fingerprint_pictures import distribution
+from blesim.reruns.registry import change_of
 from blesim.tables import Trajectory
 
 SEED = 1
@@ -34,6 +40,12 @@ def room() -> Room:
 @cache
 def trial() -> Trial:
     return EXPERIMENT.trial(SEED, pictures=True)
+
+
+def changed(short_name) -> PdrFingerprintExperiment:
+    experiment = change_of("pdr-fingerprint", short_name).experiment
+    assert isinstance(experiment, PdrFingerprintExperiment)
+    return experiment
 
 
 def way(*knots):
@@ -176,3 +188,80 @@ def test_pictures_have_names_of_their_own_and_labels_with_units():
         assert picture.x_label.endswith("]")
         assert picture.y_label.endswith("]")
         assert all(len(curve.x) == len(curve.y) > 1 for curve in picture.curves)
+
+
+def test_errors_of_the_stands_alone_are_told_instead_of_those_of_every_reading():
+    found = changed("errors-where-the-tester-stood").trial(SEED).numbers
+    ends = trial().numbers
+    for path in paper.PATHS:
+        for mode in paper.MODES:
+            for statistic in (paper.MAX, paper.MEAN):
+                key = paper.error_key(path, mode, statistic)
+                assert found[key] == ends[paper.stand_key(path, mode, statistic)]
+
+
+def test_a_change_shows_keys_of_its_own_numbers():
+    numbers = set(trial().numbers)
+    for change in CHANGES:
+        assert 2 <= len(change.shown) <= 6
+        assert all(isinstance(key, Key) for key in change.shown)
+        assert numbers.issuperset(change.shown)
+
+
+@pytest.mark.parametrize(
+    ("name", "stands"),
+    [
+        ("stands-of-30-s", {"simple": 3, "complex": 3}),
+        ("stands-of-30-s-beside-every-beacon", {"simple": 7, "complex": 6}),
+    ],
+)
+def test_the_tester_stands_longer(name, stands):
+    other = changed(name)
+    there = walked(SEED, other.values, other.estimator)
+    for path, count in stands.items():
+        trajectory = there.truth.walks[path].trajectory
+        assert len(stand_ends_us(trajectory, 29.9)) == count
+        # None other than these.
+        assert len(stand_ends_us(trajectory, 6.0)) == count
+
+
+def test_beside_a_beacon_is_as_near_as_it_says():
+    other = changed("stands-beside-every-beacon")
+    there = walked(SEED, other.values, other.estimator)
+    beacons_m = there.recording.venue.beacon_xyz_m[:, :2]
+    for path, most_m in {"simple": 0.61, "complex": 1.4}.items():
+        trajectory = there.truth.walks[path].trajectory
+        place = trajectory.at(stand_ends_us(trajectory, 6.0))
+        away_m = np.hypot(
+            place.x_m[:, None] - beacons_m[:, 0], place.y_m[:, None] - beacons_m[:, 1]
+        )
+        assert np.max(np.min(away_m, axis=1)) < most_m
+        assert set(np.argmin(away_m, axis=1)) == {0, 1, 2, 3}
+
+
+def test_without_body_and_multipath_no_direction_differs_from_another():
+    values = {"radio.people.body_loss_db": 0.0, "radio.fading.model": "none"}
+    turned_db = PdrFingerprintExperiment(values=values).trial(SEED).numbers[paper.TURNED]
+    # Sway and rounding remain.
+    assert turned_db < 1.0
+    assert trial().numbers[paper.TURNED] > 5.0
+
+
+def test_a_filter_without_noise_walks_the_same_way_whatever_it_hears():
+    settings = changed("four-choices-together").estimator
+    deaf = replace(settings, start_m=0.0, step_variance_m2=0.0)
+    ways_m = []
+    for multipath in ("rician", "none"):
+        there = walked(SEED, {"radio.fading.model": multipath}, deaf)
+        track = there.tracks["simple", paper.WITHOUT]
+        way_m = np.stack([track.x_m, track.y_m], axis=1)
+        moved = np.any(np.diff(way_m, axis=0) != 0.0, axis=1)
+        ways_m.append(way_m[1:][moved])
+    assert len(ways_m[0]) > 40
+    assert ways_m[0] == pytest.approx(ways_m[1], abs=1e-9)
+
+
+def test_the_page_quotes_changes_by_their_names():
+    page = files("blesim") / "docs" / "reruns" / "pdr-fingerprint.md"
+    quoted = set(re.findall(r'"([^"]+)"', page.read_text(encoding="utf-8")))
+    assert quoted == {change.name for change in CHANGES}

@@ -1,5 +1,6 @@
 """The proximity paper rerun: a number for everything published, and sums worked by hand."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,12 +14,15 @@ from blesim.recording import Recording, Walk, WalkKind, WalkTruth
 from blesim.reruns.base import Key, Trial
 from blesim.reruns.proximity_pf import (
     EXPERIMENT,
+    PROXIMITY,
     errors_at_m,
     five_trials,
     numbers_of_table,
     read_out_us,
 )
 from blesim.reruns.proximity_pf_cells import Cells, cells_of, numbers_of_cells, ring_of
+from blesim.reruns.proximity_pf_changes import CHANGES
+from blesim.reruns.proximity_pf_given import with_near_by_chance, with_true_headings
 from blesim.reruns.proximity_pf_numbers import (
     ALGORITHMS,
     CELLS,
@@ -221,3 +225,63 @@ def test_the_same_seed_gives_the_same_numbers_and_pictures_beside():
         assert "[" in picture.x_label
         assert "[" in picture.y_label
         assert all(len(curve.x) == len(curve.y) > 0 for curve in picture.curves)
+
+
+def test_every_change_changes_something_and_can_be_simulated():
+    for change in CHANGES:
+        assert change.experiment != EXPERIMENT, change.name
+        scenario_of("h-floor", change.experiment.values)
+
+
+def test_headings_are_told_as_they_were_on_the_steps_that_were_sensed():
+    _, recording, truth = simulated()
+    given = with_true_headings(recording, truth)
+    seen = recording.by_name["trial-2"].observations
+    told = given.by_name["trial-2"].observations.steps
+    sensed = PROXIMITY.steps(recording.venue, surveys_of(recording)).start().advance(seen)
+    assert told.time_us.tolist() == sensed.time_us.tolist()
+    true = truth.walks["trial-2"].trajectory.at(told.time_us)
+    assert told.heading_rad == pytest.approx(true.heading_rad, abs=1e-5)
+    assert given.by_name["trial-2"].observations.imu == seen.imu
+    # Nothing is learned that would be taken off them.
+    ours = replace(PROXIMITY, source="system").fit(given.venue, surveys_of(given))
+    assert ours.learned is not None
+    assert ours.learned.steps.offset_rad == 0.0
+
+
+def test_near_by_chance_is_told_as_often_as_equation_five_says():
+    _, recording, truth = simulated()
+    given = with_near_by_chance(recording, truth, 3)
+    chances, told = [], []
+    for walk in walks_of(given):
+        readings = walk.observations.readings
+        assert readings.rssi_dbm.tolist() == (
+            recording.by_name[walk.name].observations.readings.rssi_dbm.tolist()
+        )
+        true = truth.walks[walk.name].trajectory.at(readings.time_us)
+        beacon_m = recording.venue.beacon_xyz_m[readings.beacon]
+        distance_m = np.hypot(true.x_m - beacon_m[:, 0], true.y_m - beacon_m[:, 1])
+        chance = np.clip(1.1077 - 0.3053 * distance_m, 0.0, 1.0)
+        chances.append(chance)
+        told.append(readings.proximity == Proximity.NEAR)
+    chance, near = np.concatenate(chances), np.concatenate(told)
+    assert not near[chance == 0.0].any()
+    assert near[chance == 1.0].all()
+    spread = np.sqrt(np.sum(chance * (1.0 - chance)))
+    assert abs(np.count_nonzero(near) - np.sum(chance)) < 4.0 * spread
+    assert given.by_name["proximity"] == recording.by_name["proximity"]
+
+
+def test_without_body_shadows_and_multipath_near_ends_at_three_metres():
+    clean_air = {
+        "radio.fading.model": "none",
+        "radio.shadowing.standard_deviation_db": 0.0,
+        "radio.people.body_loss_db": 0.0,
+    }
+    file = five_trials(scenario_of("h-floor", clean_air))
+    recording, _ = Simulation.run(file, 1).recording()
+    cells = cells_of(surveys_of(recording), recording.venue)
+    # In space from the tablet, 1.0 m above the floor; whole dB blur the edge.
+    range_m = np.hypot(cells.distance_m, 1.0)
+    assert (cells.proximity[(range_m > 1.2) & (range_m < 2.7)] == Proximity.NEAR).all()
+    assert (cells.proximity[range_m > 3.3] == Proximity.FAR).all()

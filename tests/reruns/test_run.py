@@ -10,8 +10,8 @@ from blesim.cli import app
 from blesim.errors import DataError, UsageError
 from blesim.report.rerun_page import as_dict, write_reruns
 from blesim.reruns import registry, run
-from blesim.reruns.base import Curve, Expected, Key, Picture, Published, Trial
-from blesim.reruns.trials_on_disk import TrialStore
+from blesim.reruns.base import Change, Curve, Expected, Key, Picture, Published, Trial
+from blesim.reruns.trials_on_disk import Task, TrialStore
 
 NEAR, FAR = (Key("table 1", row, "mean [m]") for row in ("near | first", "far"))
 OURS = Key("table 1", "ours", "mean [m]")
@@ -22,6 +22,7 @@ class Experiment:
     title = "Two numbers & a picture"
     published = (Published(key=NEAR, value=1.0), Published(key=FAR, value=3.0))
     expected = (Expected(better=NEAR, worse=FAR, condition="same walk", strong=True),)
+    more = 0.0
 
     def __init__(self):
         self.done = []
@@ -38,7 +39,7 @@ class Experiment:
             kind="step",
             curves=(line,),
         )
-        numbers = {NEAR: 1.0 + 0.1 * seed, FAR: 2.0 + 0.1 * seed, OURS: float("nan")}
+        numbers = {NEAR: 1.0 + 0.1 * seed, FAR: 2.0 + 0.1 * seed + self.more, OURS: float("nan")}
         return Trial(numbers=numbers, pictures=(drawn,) if pictures else ())
 
     def overview(self, numbers):
@@ -67,7 +68,7 @@ def store(tmp_path, version="1"):
 
 def test_a_run_resumes_where_it_stopped(tiny, tmp_path):
     tasks = run.tasks_of(["tiny"], 3)
-    assert tasks == [("tiny", 1), ("tiny", 2), ("tiny", 3)]
+    assert tasks == [("tiny", 1, ""), ("tiny", 2, ""), ("tiny", 3, "")]
     first = run.trials(tasks, store(tmp_path))
     next(first)
     next(first)
@@ -99,7 +100,7 @@ def test_a_damaged_trial_is_told(tmp_path):
 @pytest.mark.usefixtures("tiny")
 def test_numbers_survive_the_disk(tmp_path):
     list(run.trials(run.tasks_of(["tiny"], 1), store(tmp_path)))
-    found = store(tmp_path).load("tiny", 1)
+    found = store(tmp_path).load(Task("tiny", 1))
     assert found[NEAR] == 1.1
     assert np.isnan(found[OURS])
 
@@ -149,7 +150,7 @@ def test_dask_workers_give_the_same_numbers(tmp_path):
         list(run.trials(tasks, store(tmp_path / "dask"), scheduler=cluster.scheduler_address))
     list(run.trials(tasks, store(tmp_path / "here")))
     for task in tasks:
-        there, here = (store(tmp_path / name).load(*task) for name in ("dask", "here"))
+        there, here = (store(tmp_path / name).load(task) for name in ("dask", "here"))
         assert there[NEAR] == here[NEAR]
 
 
@@ -162,3 +163,49 @@ def test_unknown_papers_are_refused_by_name():
 def test_the_version_changes_with_the_sources():
     assert run.version_text() == run.version_text()
     assert "numpy" in run.version_text()
+
+
+def changed_tiny():
+    otherwise = Experiment()
+    otherwise.more = 0.5
+    return Change(name="Half a metre more", why="To see.", experiment=otherwise, shown=(NEAR, FAR))
+
+
+@pytest.mark.usefixtures("tiny")
+def test_what_a_change_does_is_told_seed_by_seed(tmp_path, monkeypatch):
+    change = changed_tiny()
+    monkeypatch.setattr(run, "changes_of", lambda _: (change,))
+    monkeypatch.setattr(run, "change_of", lambda *_: change)
+    tasks = run.tasks_of(["tiny"], 3, what_if=True)
+    assert [task.change for task in tasks] == [""] * 3 + ["half-a-metre-more"] * 3
+    list(run.trials(tasks, store(tmp_path)))
+    rerun = run.summarised("tiny", 3, store(tmp_path), pictures=False, what_if=True)
+    near, far = rerun.changed[0].figures
+    assert near.difference == 0.0
+    assert far.simulated == pytest.approx(2.7)
+    # The seeds differ, by how much the change makes is the same in each.
+    assert far.high > far.low
+    assert far.difference_low == pytest.approx(0.5) == pytest.approx(far.difference_high)
+    write_reruns([rerun], tmp_path)
+    told = json.loads((tmp_path / "reruns.json").read_text(encoding="utf-8"))
+    assert [each["change"] for each in told["changes"]] == ["Half a metre more"] * 2
+    text = (tmp_path / "reruns.md").read_text(encoding="utf-8")
+    assert "| Half a metre more | To see. | 1.2 (0 to 0) | 2.7 (0.5 to 0.5) |" in text
+    assert "<td>Half a metre more</td>" in (tmp_path / "index.html").read_text(encoding="utf-8")
+
+
+def test_a_change_is_found_by_its_short_name(monkeypatch):
+    change = changed_tiny()
+    monkeypatch.setattr(registry, "changes_of", lambda _: (change,))
+    assert registry.change_of("tiny", "half-a-metre-more") is change
+    with pytest.raises(UsageError, match="has no change 'moon'; it has half-a-metre-more"):
+        registry.change_of("tiny", "moon")
+
+
+@pytest.mark.parametrize("paper", registry.PAPERS)
+def test_changes_have_names_of_their_own_and_show_numbers_that_there_are(paper):
+    changes = registry.changes_of(paper)
+    assert changes
+    names = [change.short_name for change in changes]
+    assert len(set(names)) == len(names)
+    assert all(change.why.endswith(".") and change.shown for change in changes)
