@@ -163,10 +163,11 @@ def overview_pictures(
         Picture(
             name="methods",
             title="Table 2: mean error of each run",
-            x_label="run [-]",
+            x_label="run",
             y_label="mean error [m]",
             kind="line",
             curves=tuple(_beside(runs, numbers, printed)),
+            x_names=("1", "2", "3"),
         ),
         Picture(
             name="particles",
@@ -186,7 +187,8 @@ def _beside(
 ) -> Iterator[Curve]:
     for label, x, keys in lines:
         yield _curve(f"{label}, simulated", x, np.array([numbers[key].mean() for key in keys]))
-        yield _curve(f"{label}, published", x, np.array([printed[key] for key in keys]))
+        published = np.array([printed[key] for key in keys])
+        yield Curve(label=f"{label}, published", x=x, y=published, published=True)
 
 
 def _curve(label: str, x: ArrayLike, y: ArrayLike) -> Curve:

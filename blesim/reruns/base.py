@@ -62,11 +62,15 @@ class Expected:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Curve:
-    """One line of a picture: its label, and pairs of x and y, (n,)."""
+    """One line of a picture: its label, and pairs of x and y, (n,).
+
+    One of published numbers follows ours that it belongs to, and has its colour.
+    """
 
     label: str
     x: Numbers
     y: Numbers
+    published: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -85,6 +89,8 @@ class Picture:
         What is drawn.
     venue : Venue or None
         Floor plan of a map.
+    x_names : tuple of str
+        Of the places of the first curve's x, where they are no numbers.
     """
 
     name: str
@@ -94,6 +100,7 @@ class Picture:
     kind: Literal["line", "step", "bars", "map"]
     curves: tuple[Curve, ...]
     venue: Venue | None = None
+    x_names: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

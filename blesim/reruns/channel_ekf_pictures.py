@@ -186,15 +186,16 @@ def error_overview(numbers: Mapping[Key, Numbers]) -> list[Picture]:
         case = np.arange(1.0, len(cases) + 1)
         curves += [
             Curve(label=f"{method}, simulated", x=case, y=simulated),
-            Curve(label=f"{method}, published", x=case, y=published),
+            Curve(label=f"{method}, published", x=case, y=published, published=True),
         ]
     return [
         Picture(
             name="overview",
             title="90 % position errors, mean over the seeds",
-            x_label="1, 2: dense I, II; 3, 4: sparse I, II",
+            x_label="beacons and trajectory",
             y_label="90 % position error [m]",
             kind="bars",
             curves=tuple(curves),
+            x_names=tuple(" ".join(each) for each in cases),
         )
     ]

@@ -185,8 +185,8 @@ def overview_pictures(numbers: Mapping[Key, Numbers]) -> Iterator[Picture]:
     yield _bars(
         "lengths",
         "Mean difference from the real length (table 2)",
-        ("step-length model: Eq 6, 7, 8 [-]", "difference [m]"),
-        (6.0, 7.0, 8.0),
+        ("step-length model", "difference [m]"),
+        {6.0: "Eq 6", 7.0: "Eq 7", 8.0: "Eq 8"},
         {"": lambda at: Key(names.LENGTHS, f"Eq {at:g}", names.OFF_MEAN)},
         (mean, printed),
     )
@@ -194,7 +194,7 @@ def overview_pictures(numbers: Mapping[Key, Numbers]) -> Iterator[Picture]:
         "azimuths",
         "Mean error of the azimuth in each corridor (table 3)",
         ("azimuth of the corridor [degree]", "error [degree]"),
-        tuple(map(float, names.AZIMUTHS_DEG)),
+        {float(each): f"{each:g}" for each in names.AZIMUTHS_DEG},
         {
             "raw, ": lambda at: Key(names.HEADINGS, names.azimuth_row(at), names.RAW_MEAN),
             "compensated, ": lambda at: Key(
@@ -206,8 +206,8 @@ def overview_pictures(numbers: Mapping[Key, Numbers]) -> Iterator[Picture]:
     yield _bars(
         "solutions",
         "Mean error of the solutions (table 4)",
-        ("solution: 1 OHPDR, 2 AHPDR, 3 BEPDR, 4 EKFPDR [-]", "error [m]"),
-        (1.0, 2.0, 3.0, 4.0),
+        ("solution", "error [m]"),
+        {float(place): name for place, name in enumerate(_SHOWN, start=1)},
         {"": lambda at: Key(names.SOLUTIONS, list(_SHOWN)[int(at) - 1], names.MEAN)},
         (mean, printed),
     )
@@ -225,16 +225,17 @@ def _bars(
     name: str,
     title: str,
     labels: tuple[str, str],
-    at: tuple[float, ...],
+    at: Mapping[float, str],
     keys: Mapping[str, Callable[[float], Key]],
     values: tuple[Mapping[Key, float], Mapping[Key, float]],
 ) -> Picture:
-    """Bars at places of the x axis: of each kind of key one simulated, one published."""
+    """Bars at named places of the x axis: of each kind of key one simulated, one published."""
     curves = [
         Curve(
             label=kind + source,
-            x=np.array(at),
+            x=np.array(list(at)),
             y=np.array([found[key_of(place)] for place in at]),
+            published=source == "published",
         )
         for kind, key_of in keys.items()
         for source, found in zip(("simulated", "published"), values, strict=True)
@@ -246,6 +247,7 @@ def _bars(
         y_label=labels[1],
         kind="bars",
         curves=tuple(curves),
+        x_names=tuple(at.values()),
     )
 
 
@@ -259,4 +261,5 @@ def _density_curves(mean: Mapping[Key, float], printed: Mapping[Key, float]) -> 
                 label=f"{word}, {source}",
                 x=np.array(names.BEACONS, np.float64),
                 y=np.array([found[key] for key in keys]),
+                published=source == "published",
             )

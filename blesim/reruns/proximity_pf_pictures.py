@@ -136,6 +136,7 @@ def _shares(numbers: Mapping[Key, Numbers], name: str, whose: str) -> Picture:
                 label="published line (Eq 5)",
                 x=ring_m,
                 y=printed[INTERCEPT] + printed[SLOPE] * ring_m,
+                published=True,
             ),
         ),
     )
