@@ -210,16 +210,34 @@ def _markdown(
     yield f"{_READING}\n"
     for rerun in reruns:
         yield f"## {_title(rerun)}\n"
-        yield f"{summary(rerun)}.\n"
-        yield from _rows_of(_FIGURE_HEADER, map(_figure_cells, rerun.figures))
-        yield from _rows_of(_ORDERING_HEADER, map(_ordering_cells, rerun.orderings))
+        yield from _compared(rerun)
         for title, path in pictures[rerun.experiment.paper]:
             yield f"![{title}]({path.name})\n"
         yield _why(rerun)
-        if rerun.changed:
-            yield f"{_CHANGED}\n"
-        for header, rows in _changed_tables(rerun):
-            yield from _rows_of(header, rows)
+        yield from _otherwise(rerun)
+
+
+def tables_page(reruns: Sequence[Rerun]) -> str:
+    """All tables as Markdown, for the documentation, whose text stands on pages of its own."""
+    lines = ["# Published experiments, rerun: all tables\n", f"{_READING}\n"]
+    for rerun in reruns:
+        page = _page_name(rerun)
+        lines += [f"## {_title(rerun)}\n", f"Explained in [{page}]({page}).\n"]
+        lines += [*_compared(rerun), *_otherwise(rerun)]
+    return "\n".join(lines)
+
+
+def _compared(rerun: Rerun) -> Iterator[str]:
+    yield f"{summary(rerun)}.\n"
+    yield from _rows_of(_FIGURE_HEADER, map(_figure_cells, rerun.figures))
+    yield from _rows_of(_ORDERING_HEADER, map(_ordering_cells, rerun.orderings))
+
+
+def _otherwise(rerun: Rerun) -> Iterator[str]:
+    if rerun.changed:
+        yield f"{_CHANGED}\n"
+    for header, rows in _changed_tables(rerun):
+        yield from _rows_of(header, rows)
 
 
 def _rows_of(header: Sequence[str], rows: Iterable[list[str]]) -> Iterator[str]:
@@ -230,9 +248,13 @@ def _rows_of(header: Sequence[str], rows: Iterable[list[str]]) -> Iterator[str]:
     yield ""
 
 
+def _page_name(rerun: Rerun) -> str:
+    return f"{rerun.experiment.paper}.md"
+
+
 def _why(rerun: Rerun) -> str:
     """What the documentation says about where and why ours differs."""
-    page = files("blesim") / "docs" / "reruns" / f"{rerun.experiment.paper}.md"
+    page = files("blesim") / "docs" / "reruns" / _page_name(rerun)
     return page.read_text(encoding="utf-8") if page.is_file() else ""
 
 
