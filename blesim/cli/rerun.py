@@ -38,7 +38,8 @@ def rerun(
 ) -> None:
     """Rerun published experiments; resumes where it stopped.
 
-    Writes into the folder: `reruns.json`, `reruns.md`, `index.html` and the pictures.
+    Writes into the folder: `reruns.json`, `reruns.md`, `index.html` and the pictures, of the papers
+    asked for this time; trials done before are kept.
     """
     from blesim.report.rerun_page import as_dict, write_reruns
     from blesim.reruns.registry import PAPERS

@@ -34,6 +34,7 @@ _READING = (
     " 1.5 either way; an ordering holds if the difference has the published sign, and p is of the"
     " paired t test. What does not agree is explained below the tables."
 )
+_UNCHANGED = "Tables of what is named in quotes, with one thing otherwise, come with --what-if."
 _CHANGED = (
     "With one thing otherwise: the mean, and the 95 % interval of the difference that it makes, by"
     " seed."
@@ -234,8 +235,7 @@ def _compared(rerun: Rerun) -> Iterator[str]:
 
 
 def _otherwise(rerun: Rerun) -> Iterator[str]:
-    if rerun.changed:
-        yield f"{_CHANGED}\n"
+    yield f"{_CHANGED if rerun.changed else _UNCHANGED}\n"
     for header, rows in _changed_tables(rerun):
         yield from _rows_of(header, rows)
 
@@ -279,8 +279,7 @@ def _page(reruns: Sequence[Rerun], pictures: dict[str, list[tuple[str, Path]]]) 
             image = b64encode(path.read_bytes()).decode()
             yield f"<img alt='{escape(title, quote=True)}' src='data:image/png;base64,{image}'>"
         yield from map(_html_paragraph, _why(rerun).split("\n\n"))
-        if rerun.changed:
-            yield f"<p>{_CHANGED}</p>"
+        yield f"<p>{_CHANGED if rerun.changed else _UNCHANGED}</p>"
         for header, rows in _changed_tables(rerun):
             yield _html_table(header, rows, [False] * len(rows))
     yield "</body></html>\n"

@@ -89,8 +89,9 @@ def trials(
     Raises
     ------
     UsageError
-        If there is no such scheduler.
+        If there is no such scheduler, or trials cannot be kept there.
     """
+    store.make_room(tasks)
     left = []
     for task in tasks:
         if store.load(task) is None:
@@ -148,8 +149,9 @@ def summarised(
         If a trial is missing or gave no number for something published or compared.
     """
     experiment = experiment_of(paper)
-    published = [each.key for each in experiment.published]
-    numbers = _numbers_of([Task(paper, seed) for seed in _seeds(seeds)], published, store)
+    ordered = [key for each in experiment.expected for key in (each.better, each.worse)]
+    wanted = list(dict.fromkeys([*(each.key for each in experiment.published), *ordered]))
+    numbers = _numbers_of([Task(paper, seed) for seed in _seeds(seeds)], wanted, store)
     drawn = experiment.trial(FIRST_SEED, pictures=True).pictures if pictures else ()
     return Rerun(
         experiment=experiment,
@@ -170,11 +172,12 @@ def _numbers_of(
     what = " / ".join(filter(None, (tasks[0].paper, tasks[0].change)))
     if len(done) < len(tasks):
         raise DataError(f"{store.folder}: {len(tasks) - len(done)} trials of {what} are missing")
-    numbers = stacked(done)
-    missing = [key for key in wanted if key not in numbers]
-    if missing:
-        raise DataError(f"{what}: no trial gave {', '.join(map(' / '.join, missing))}")
-    return numbers
+    for task, numbers in zip(tasks, done, strict=True):
+        missing = [key for key in wanted if not np.isfinite(numbers.get(key, np.nan))]
+        if missing:
+            told = ", ".join(map(" / ".join, missing))
+            raise DataError(f"{what}, seed {task.seed}: no number for {told}")
+    return stacked(done)
 
 
 def _changed(

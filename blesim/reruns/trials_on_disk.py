@@ -1,12 +1,13 @@
 """Trials of experiments on disk: one small file a seed, so that a run resumes where it stopped."""
 
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
-from blesim.errors import DataError
+from blesim.errors import DataError, UsageError
 from blesim.reruns.base import Key
 from blesim.whole_file import write_whole
 
@@ -45,18 +46,35 @@ class TrialStore:
         path = self._path(task)
         try:
             told = json.loads(path.read_text(encoding="utf-8"))
+            if told["version"] != self.version:
+                return None
+            if Task(told["paper"], told["seed"], told["change"]) != task:
+                raise ValueError("of another trial")
+            return {Key(*each["key"]): _number(each["value"]) for each in told["numbers"]}
         except FileNotFoundError:
             return None
-        except (OSError, ValueError) as fault:
+        except (OSError, ValueError, TypeError, LookupError) as fault:
             raise DataError(f"{path}: damaged ({fault}); delete it to do it again") from fault
-        if told.get("version") != self.version:
-            return None
-        return {Key(*each["key"]): _number(each["value"]) for each in told["numbers"]}
+
+    def make_room(self, tasks: Iterable[Task]) -> None:
+        """Make the folders of trials, before the work of the first of them is done.
+
+        Raises
+        ------
+        UsageError
+            If they cannot be made or written to.
+        """
+        for folder in sorted({self._path(task).parent for task in tasks}):
+            try:
+                folder.mkdir(parents=True, exist_ok=True)
+            except OSError as fault:
+                raise UsageError(f"{folder}: cannot be made: {fault.strerror}") from fault
+            if not os.access(folder, os.W_OK):
+                raise UsageError(f"{folder}: cannot be written to; give another folder")
 
     def save(self, task: Task, numbers: Mapping[Key, float]) -> None:
-        """Write the numbers of a trial, whole or not at all."""
+        """Write the numbers of a trial, whole or not at all; its folder was made before."""
         path = self._path(task)
-        path.parent.mkdir(parents=True, exist_ok=True)
         told = {
             **task._asdict(),
             "version": self.version,
@@ -72,5 +90,9 @@ class TrialStore:
         return folder / f"seed-{task.seed:04d}.json"
 
 
-def _number(value: float | None) -> float:
-    return float("nan") if value is None else value
+def _number(value: object) -> float:
+    if value is None:
+        return float("nan")
+    if not isinstance(value, int | float):
+        raise TypeError(f"no number: {value}")
+    return float(value)

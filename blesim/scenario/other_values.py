@@ -21,7 +21,7 @@ def laid_in(document: Any, values: Mapping[str, Any]) -> Any:
     Raises
     ------
     KeyError
-        With the path that leads through something else, or beyond a list.
+        With the path that leads through something else, beyond a list, or to all of nothing.
     """
     changed = deepcopy(document)
     for path, value in values.items():
@@ -47,10 +47,13 @@ def _parts(part: Any, way: list[str], path: str) -> list[Any]:
 
 def _keys(part: Any, name: str, path: str) -> list[Any]:
     if isinstance(part, dict):
-        return list(part) if name == EVERY else [name]
-    if isinstance(part, list):
-        if name == EVERY:
-            return list(range(len(part)))
-        if name.isdigit() and int(name) < len(part):
-            return [int(name)]
-    raise KeyError(path)
+        if name != EVERY:
+            return [name]
+        keys: list[Any] = list(part)
+    elif isinstance(part, list):
+        keys = [row for row in range(len(part)) if name in (EVERY, str(row))]
+    else:
+        keys = []
+    if not keys:
+        raise KeyError(path)
+    return keys

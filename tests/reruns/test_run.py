@@ -88,13 +88,46 @@ def test_trials_of_another_version_do_not_count(tiny, tmp_path):
 
 
 @pytest.mark.usefixtures("tiny")
-def test_a_damaged_trial_is_told(tmp_path):
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda _: "{",
+        lambda _: json.dumps([]),
+        lambda _: json.dumps(None),
+        lambda told: json.dumps({**told, "numbers": None}),
+        lambda told: json.dumps({**told, "numbers": [{"key": ["table 1"], "value": 1.0}]}),
+        lambda told: json.dumps({**told, "numbers": [{"key": list(NEAR), "value": "x"}]}),
+        lambda told: json.dumps({**told, "seed": 2}),
+    ],
+)
+def test_a_damaged_trial_is_told(tmp_path, damage):
     tasks = run.tasks_of(["tiny"], 1)
     list(run.trials(tasks, store(tmp_path)))
     (path,) = tmp_path.rglob("*.json")
-    path.write_text("{", encoding="utf-8")
+    path.write_text(damage(json.loads(path.read_text(encoding="utf-8"))), encoding="utf-8")
     with pytest.raises(DataError, match="delete it to do it again"):
         list(run.trials(tasks, store(tmp_path)))
+
+
+def test_a_folder_that_takes_no_trials_is_told_before_the_work(tiny, tmp_path, monkeypatch):
+    tasks = run.tasks_of(["tiny"], 1)
+    (tmp_path / "trials").write_text("", encoding="utf-8")
+    with pytest.raises(UsageError, match="tiny: cannot be made"):
+        list(run.trials(tasks, store(tmp_path)))
+    (tmp_path / "trials").unlink()
+    monkeypatch.setattr("os.access", lambda *_: False)
+    with pytest.raises(UsageError, match="cannot be written to; give another folder"):
+        list(run.trials(tasks, store(tmp_path)))
+    assert tiny.done == []
+
+
+@pytest.mark.usefixtures("tiny")
+def test_a_number_that_one_seed_lacks_is_told(tmp_path):
+    list(run.trials(run.tasks_of(["tiny"], 2), store(tmp_path)))
+    numbers = store(tmp_path).load(Task("tiny", 2))
+    store(tmp_path).save(Task("tiny", 2), {**numbers, FAR: float("nan")})
+    with pytest.raises(DataError, match="tiny, seed 2: no number for table 1 / far / mean"):
+        run.summarised("tiny", 2, store(tmp_path))
 
 
 @pytest.mark.usefixtures("tiny")
@@ -135,7 +168,7 @@ def test_a_number_that_no_trial_gives_is_told(tiny, tmp_path):
     missing = Published(key=Key("table 9", "x", "y"), value=1.0)
     tiny.published = (*Experiment.published, missing)
     list(run.trials(run.tasks_of(["tiny"], 1), store(tmp_path)))
-    with pytest.raises(DataError, match="no trial gave table 9 / x / y"):
+    with pytest.raises(DataError, match="seed 1: no number for table 9 / x / y"):
         run.summarised("tiny", 1, store(tmp_path))
 
 

@@ -1,6 +1,6 @@
 """The tables of the reruns in the documentation; run this file with a folder to write them.
 
-``blesim rerun all --what-if --seeds 10 -o FOLDER`` makes the folder.
+``blesim rerun all --what-if --seeds 20 -o FOLDER`` makes the folder.
 """
 
 import sys
@@ -15,7 +15,7 @@ from blesim.reruns.run import summarised, version_text
 from blesim.reruns.trials_on_disk import TrialStore
 
 PAGE = Path(blesim.__file__).parent / "docs" / "reruns" / "tables.md"
-SEEDS = 10
+SEEDS = 20
 
 
 @pytest.fixture(scope="module")
