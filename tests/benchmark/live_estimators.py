@@ -12,8 +12,8 @@ from blesim.estimators.registry import estimator_names, make_estimator
 from blesim.estimators.run import fit, start_of, visible
 from blesim.rng import Draws
 
-# A phone that scans without pause hears about so many beacons' packets a second (FACTS of the
-# measured store: 1000 to 1300 readings in 85 s).
+# A phone that scans without pause hears about so many beacons' packets a second (in the
+# published store: 1000 to 1300 readings in 85 s).
 READINGS_A_SECOND = 13.0
 
 

@@ -52,7 +52,7 @@ def test_no_steps_in_a_stop():
 
 def test_the_speed_of_a_step_rate_gives_that_rate():
     gait = Gait()
-    # FACTS: 1.65 Hz at 1.0 m/s, 1.82 Hz at 1.25 m/s.
+    # Measured: 1.65 Hz at 1.0 m/s, 1.82 Hz at 1.25 m/s.
     assert speed_at_m_s(1.65, gait) == pytest.approx(1.0, abs=0.02)
     assert speed_at_m_s(1.82, gait) == pytest.approx(1.25, abs=0.02)
     steps = steps_of(straight_on(speed_at_m_s(1.9, gait), 200.0), gait, seed=1, walker="w")

@@ -65,7 +65,7 @@ def test_a_step_is_told_an_interval_after_its_peak():
 
 
 def test_the_count_on_recorded_walks_is_off_by_two_percent(data_dir):
-    # FACTS: 2.1 %, mean absolute, over 48 walks counted by hand, with the filter run both ways.
+    # Measured: 2.1 %, mean absolute, over 48 walks counted by hand, with the filter run both ways.
     folder = data_dir("oxford_steps")
     with open(folder / "index.csv", newline="") as lines:
         rows = list(csv.DictReader(lines))

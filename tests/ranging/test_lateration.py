@@ -144,8 +144,8 @@ def test_whatever_the_ranges_there_is_a_sound_answer(range_m):
 
 
 def test_walks_through_the_real_hall(hall):
-    # FACTS, log-distance grid likelihood, the nearest kin: median 2.34 m, mean 2.71 m. One fix in
-    # ten readings; the beacon was carried at 1.75 m and surveyed at 1.85 m.
+    # Measured before, log-distance grid likelihood, the nearest kin: median 2.34 m, mean 2.71 m.
+    # One fix in ten readings; the beacon was carried at 1.75 m and surveyed at 1.85 m.
     model = fit_path_loss(hall.survey, hall.survey.distance_m(hall.venue, 1.85))
     curve = model.of(np.arange(12), np.zeros(12, np.int64))
     errors_m = []

@@ -175,8 +175,8 @@ def test_too_little_to_learn_from_is_refused(readings_at):
 
 
 def test_the_real_hall(hall):
-    # FACTS: A = -61.4 dBm, n = 1.48, spread 4.5 dB on the means of links; single readings spread
-    # more, and set 1 is weaker, by half a decibel.
+    # Measured before: A = -61.4 dBm, n = 1.48, spread 4.5 dB on the means of links; single readings
+    # spread more, and set 1 is weaker, by half a decibel.
     model = fit_path_loss(hall.survey, hall.survey.distance_m(hall.venue, 1.85))
     assert model.curves.level_dbm[0] == pytest.approx(-61.6, abs=1.0)
     assert model.curves.exponent[0] == pytest.approx(1.48, abs=0.15)
