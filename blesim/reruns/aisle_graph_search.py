@@ -15,18 +15,17 @@ from dataclasses import asdict
 from itertools import product
 from typing import TypeVar
 
-from blesim.errors import DataError
 from blesim.estimators.base import Estimator
 from blesim.estimators.beacon_pair import BeaconPair
 from blesim.estimators.graph_particle_filter import GraphParticleFilter
 from blesim.estimators.graph_tunings import PRESETS
 from blesim.estimators.nearest_beacon import NearestBeacon
-from blesim.estimators.run import fit, follow
 from blesim.metrics.position_error import position_errors
 from blesim.ranging.smoothing import SignalKind
-from blesim.recording import Failure, Recording, Truth, Walk
+from blesim.recording import Recording, Truth, Walk
 from blesim.reruns.aisle_graph_numbers import AVERAGED, NEAREST, PAIR, PARTICLES, particles_row
 from blesim.reruns.base import Numbers
+from blesim.reruns.followed import followed, learned
 from blesim.tables import Track
 
 E = TypeVar("E", bound=Estimator)
@@ -158,10 +157,4 @@ def tracked(
     DataError
         If the estimator fails.
     """
-    learned = fit(estimator, recording)
-    if isinstance(learned, Failure):
-        raise DataError(f"aisle-graph: {learned.reason}")
-    track = follow(learned, recording.venue, walk, seed=seed, label=label)
-    if isinstance(track, Failure):
-        raise DataError(f"aisle-graph: {walk.name}: {track.reason}")
-    return track
+    return followed(learned(estimator, recording, label), recording, walk, seed, label)

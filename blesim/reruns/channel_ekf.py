@@ -16,17 +16,17 @@ from typing import Any
 
 import numpy as np
 
-from blesim.errors import DataError, InvariantError
+from blesim.errors import InvariantError
 from blesim.estimators.base import Estimator
 from blesim.estimators.channel_ekf import ChannelEkf
 from blesim.estimators.fingerprint_ekf import FingerprintEkf
 from blesim.estimators.path_loss_ekf import PathLossEkf
-from blesim.estimators.run import fit, follow, surveys_of
+from blesim.estimators.run import surveys_of
 from blesim.metrics.position_error import PositionErrors
 from blesim.metrics.score import scored_walks, track_errors
 from blesim.metrics.summary import summarise
 from blesim.ranging.survey_readings import WALKING, SurveyReadings, survey_readings
-from blesim.recording import Failure, Recording, Truth
+from blesim.recording import Recording, Truth
 from blesim.reruns import channel_ekf_numbers as paper
 from blesim.reruns.base import Expected, Key, Numbers, Picture, Published, Trial
 from blesim.reruns.channel_ekf_numbers import DEPLOYMENTS, FP, PM, PROPOSED
@@ -41,6 +41,7 @@ from blesim.reruns.channel_ekf_ranging import (
     mean_levels,
     place_errors,
 )
+from blesim.reruns.followed import followed, learned
 from blesim.reruns.sites import scenario_of
 from blesim.scenario.reading import ScenarioFile
 from blesim.scenario.survey_plan import Spot, SurveyPlan
@@ -145,13 +146,9 @@ class ChannelEkfExperiment:
         recording, truth = Simulation.run(file, seed).recording()
         tracks, errors = {}, {}
         for method, estimator in self.estimators.items():
-            learned = fit(estimator, recording)
-            if isinstance(learned, Failure):
-                raise DataError(f"{method}, seed {seed}: {learned.reason}")
+            ready = learned(estimator, recording, method)
             for walk in scored_walks(recording):
-                track = follow(learned, recording.venue, walk, seed=seed, label=method)
-                if isinstance(track, Failure):
-                    raise DataError(f"{method} on {walk.name}, seed {seed}: {track.reason}")
+                track = followed(ready, recording, walk, seed, method)
                 tracks[method, walk.name] = track
                 errors[method, walk.name] = track_errors(recording, truth, walk, track)
         return Office(

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from blesim.errors import DataError
 from blesim.estimators.base import StartInfo
 from blesim.estimators.registry import make_estimator
-from blesim.estimators.run import fit, follow, start_of
-from blesim.recording import Failure, Recording, Truth, Walk
+from blesim.estimators.run import start_of
+from blesim.recording import Recording, Truth, Walk
 from blesim.reruns import map_ekf_numbers as names
 from blesim.reruns.base import Key, Numbers
+from blesim.reruns.followed import followed, learned
 from blesim.rng import Draws
 from blesim.scenario.reading import ScenarioFile
 from blesim.scenario.venue_source import VenueSource
@@ -146,12 +147,7 @@ def _solved(
     time_us = time_us[:: solving.every_steps]
     for row, text in solving.tried[beacons].items():
         label, estimator = make_estimator(text)
-        fitted = fit(estimator, recording)
-        if isinstance(fitted, Failure):
-            raise DataError(f"{label}: {fitted.reason}")
-        track = follow(fitted, recording.venue, walk, seed=seed, label=label)
-        if isinstance(track, Failure):
-            raise DataError(f"{label}, {beacons} beacons: {track.reason}")
+        track = followed(learned(estimator, recording, label), recording, walk, seed, label)
         error_m = errors_m(track, _start(walk), true.trajectory, time_us)
         yield (row, beacons), Solved(track=track, error_m=error_m)
 

@@ -15,16 +15,17 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from blesim.errors import DataError, InvariantError
-from blesim.estimators.base import Estimator, fitted
+from blesim.errors import InvariantError
+from blesim.estimators.base import fitted
 from blesim.estimators.fingerprint_survey import FingerprintSurvey
 from blesim.estimators.pdr_fingerprint import PdrFingerprint
-from blesim.estimators.run import follow, surveys_of
+from blesim.estimators.run import surveys_of
 from blesim.metrics.position_error import PositionErrors
 from blesim.metrics.score import track_errors
-from blesim.recording import Failure, Recording, Truth
+from blesim.recording import Recording, Truth
 from blesim.reruns import pdr_fingerprint_numbers as paper
 from blesim.reruns.base import Expected, Key, Numbers, Picture, Published, Trial
+from blesim.reruns.followed import followed
 from blesim.reruns.pdr_fingerprint_pictures import error_overview, pictures_of
 from blesim.reruns.sites import scenario_of
 from blesim.scenario.reading import NOTHING_ELSE
@@ -115,7 +116,7 @@ def walked(
         ready = with_correction(learned, correction=mode == paper.WITH)
         for path in paper.PATHS:
             walk = recording.by_name[path]
-            track = _followed(ready, recording, path, seed)
+            track = followed(ready, recording, walk, seed, "pdr-fingerprint")
             tracks[path, mode] = track
             errors[path, mode] = track_errors(recording, truth, walk, track)
     return Room(
@@ -127,14 +128,6 @@ def with_correction(learned: PdrFingerprint, *, correction: bool) -> PdrFingerpr
     """Copy of a fitted estimator that corrects or not, and knows what it knew."""
     settings = replace(learned, correction=correction)
     return fitted(settings, steps=learned.steps, survey=learned.survey)
-
-
-def _followed(estimator: Estimator, recording: Recording, path: str, seed: int) -> Track:
-    walk = recording.by_name[path]
-    track = follow(estimator, recording.venue, walk, seed=seed, label="pdr-fingerprint")
-    if isinstance(track, Failure):
-        raise DataError(f"pdr-fingerprint on {path}, seed {seed}: {track.reason}")
-    return track
 
 
 def error_numbers(room: Room, taken_at: TakenAt = "readings") -> dict[Key, float]:

@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from blesim.errors import DataError
 from blesim.estimators.base import Estimator
 from blesim.estimators.proximity_particle_filter import ProximityParticleFilter
-from blesim.estimators.run import fit, follow, surveys_of
+from blesim.estimators.run import surveys_of
 from blesim.estimators.trilateration_particle_filter import TrilaterationParticleFilter
-from blesim.recording import Failure, Recording, Truth, Walk, WalkTruth
+from blesim.recording import Recording, Truth, Walk, WalkTruth
 from blesim.reruns.base import Expected, Key, Numbers, Picture, Published, Trial
+from blesim.reruns.followed import followed, learned
 from blesim.reruns.proximity_pf_cells import cells_of, numbers_of_cells
 from blesim.reruns.proximity_pf_given import (
     with_near_by_chance,
@@ -134,8 +135,10 @@ class ProximityExperiment:
         cells = cells_of(surveys_of(recording), recording.venue)
         numbers = numbers_of_cells(cells) | numbers_of_table(errors_m)
         for penalty in PENALTIES:
-            tracks = _walked(given, replace(self.proximity, penalty=penalty), seed)
-            with_it_m = read_out_errors_m(file, recording, truth, tracks)
+            with_it_m = errors_m[OURS]
+            if penalty != self.proximity.penalty:
+                tracks = _walked(given, replace(self.proximity, penalty=penalty), seed)
+                with_it_m = read_out_errors_m(file, recording, truth, tracks)
             numbers[penalty_key(penalty)] = float(np.mean(with_it_m))
         if not pictures:
             return Trial(numbers=numbers)
@@ -181,18 +184,11 @@ def _name(trial: int) -> str:
 
 def _walked(recording: Recording, estimator: Estimator, seed: int) -> list[Track]:
     """Track of each trial."""
-    learned = fit(estimator, recording)
-    if isinstance(learned, Failure):
-        raise DataError(f"proximity-pf, seed {seed}: {learned.reason}")
     # The same label for all, so that map and penalty are compared on the same draws.
-    return [_track(learned, recording, recording.by_name[_name(trial)], seed) for trial in TRIALS]
-
-
-def _track(learned: Estimator, recording: Recording, walk: Walk, seed: int) -> Track:
-    track = follow(learned, recording.venue, walk, seed=seed, label="proximity-pf")
-    if isinstance(track, Failure):
-        raise DataError(f"proximity-pf, seed {seed}, {walk.name}: {track.reason}")
-    return track
+    label = "proximity-pf"
+    ready = learned(estimator, recording, label)
+    walks = [recording.by_name[_name(trial)] for trial in TRIALS]
+    return [followed(ready, recording, walk, seed, label) for walk in walks]
 
 
 def read_out_us(file: ScenarioFile, recording: Recording, walk: Walk) -> NDArray[np.int64]:
