@@ -26,6 +26,7 @@ from blesim.tables import Track
 from blesim.venue.venue import Venue
 
 E = TypeVar("E")
+T = TypeVar("T")
 
 
 class Need(StrEnum):
@@ -102,6 +103,12 @@ class Estimator(Protocol):
             The only source of randomness.
         """
         ...
+
+
+def part_of(kind: type[T], settings: object) -> T:
+    """Settings of a part, a dataclass, from those of a whole that has them under the same names."""
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]  # says so itself if it is no dataclass
+    return kind(**{name: getattr(settings, name) for name in names})
 
 
 def fitted(estimator: E, **learned: Any) -> E:

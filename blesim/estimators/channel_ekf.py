@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
-from blesim.estimators.base import Need, StartInfo, fitted
+from blesim.estimators.base import Need, StartInfo, fitted, part_of
 from blesim.estimators.constant_velocity import Belief, updated_by_ranges
 from blesim.estimators.enhanced_ranges import enhanced_ranges
 from blesim.estimators.epochs import EpochSettings, EpochTracker, refuse_bad_height
@@ -105,24 +105,14 @@ class ChannelEkf(EpochSettings):
         EpochSettings.__post_init__(self)
         refuse_bad_degree(self.degree)
         refuse_bad_height(self.phone_height_m)
-        self.fingerprint_settings()
+        part_of(FingerprintSettings, self)  # checks them
         if not 0 < self.confidence <= 1:
             raise UsageError(f"confidence {self.confidence:g}: give a number above 0, up to 1")
 
     @property
     def needs(self) -> frozenset[Need]:
         """A survey, and channels if they are kept apart."""
-        return frozenset({Need.SURVEY, Need.CHANNELS} if self.separate else {Need.SURVEY})
-
-    def fingerprint_settings(self) -> FingerprintSettings:
-        """Those of the settings that concern fingerprints."""
-        return FingerprintSettings(
-            separate=self.separate,
-            k=self.k,
-            search_scale=self.search_scale,
-            cell_m=self.cell_m,
-            grid_m=self.grid_m,
-        )
+        return part_of(FingerprintSettings, self).needs
 
     def fit(self, venue: Venue, surveys: Sequence[Recording]) -> Self:
         """Copy that has the polynomials and radio maps of the survey.
@@ -137,7 +127,7 @@ class ChannelEkf(EpochSettings):
             beacons_m=venue.beacon_xyz_m,
             levels=venue.beacon_level,
             curves=self._curves(survey, venue),
-            maps=fit_fingerprint_maps(survey, venue, self.fingerprint_settings()),
+            maps=fit_fingerprint_maps(survey, venue, part_of(FingerprintSettings, self)),
             estimator=self,
         )
         return fitted(self, ranges=ranges)

@@ -6,14 +6,14 @@ reading's time. So nothing has to be known of what happens later, and blocks may
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
-from blesim.estimators.base import make_track
+from blesim.estimators.base import make_track, part_of
 from blesim.estimators.constant_velocity import Belief, moved
 from blesim.ranging.smoothers import Smoothing, SmoothingKind
 from blesim.recording import Observations
@@ -86,9 +86,7 @@ class EpochSettings:
 
     def epoch_settings(self) -> "EpochSettings":
         """These settings alone, without those that a system adds."""
-        return EpochSettings(
-            **{each.name: getattr(self, each.name) for each in fields(EpochSettings)}
-        )
+        return part_of(EpochSettings, self)
 
 
 def refuse_bad_height(phone_height_m: float) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
-from blesim.estimators.base import Need, StartInfo, fitted
+from blesim.estimators.base import Need, StartInfo, fitted, part_of
 from blesim.estimators.constant_velocity import Belief, at_rest, updated_by_places
 from blesim.estimators.epochs import EpochSettings, EpochTracker
 from blesim.estimators.fingerprint_maps import (
@@ -71,22 +71,12 @@ class FingerprintEkf(EpochSettings):
 
     def __post_init__(self) -> None:
         EpochSettings.__post_init__(self)
-        self.fingerprint_settings()
+        part_of(FingerprintSettings, self)  # checks them
 
     @property
     def needs(self) -> frozenset[Need]:
         """A survey, and channels if they are kept apart."""
-        return frozenset({Need.SURVEY, Need.CHANNELS} if self.separate else {Need.SURVEY})
-
-    def fingerprint_settings(self) -> FingerprintSettings:
-        """Those of the settings that concern fingerprints."""
-        return FingerprintSettings(
-            separate=self.separate,
-            k=self.k,
-            search_scale=self.search_scale,
-            cell_m=self.cell_m,
-            grid_m=self.grid_m,
-        )
+        return part_of(FingerprintSettings, self).needs
 
     def fit(self, venue: Venue, surveys: Sequence[Recording]) -> Self:
         """Copy that has the radio map of the survey.
@@ -97,7 +87,9 @@ class FingerprintEkf(EpochSettings):
             If the survey makes no radio map.
         """
         survey = survey_readings(surveys)
-        return fitted(self, maps=fit_fingerprint_maps(survey, venue, self.fingerprint_settings()))
+        return fitted(
+            self, maps=fit_fingerprint_maps(survey, venue, part_of(FingerprintSettings, self))
+        )
 
     def start(self, start: StartInfo | None, rng: np.random.Generator) -> EpochTracker:  # noqa: ARG002 (needs neither)
         """Tracker of one walk.

@@ -18,6 +18,7 @@ import shapely
 from numpy.typing import NDArray
 
 from blesim.errors import UsageError
+from blesim.estimators.base import Need
 from blesim.estimators.constant_velocity import Belief
 from blesim.ranging.channels import channel_slot
 from blesim.ranging.gaussian_process import GaussianProcessFill, filled_radio_map
@@ -79,6 +80,11 @@ class FingerprintSettings:
             raise UsageError(f"search_scale {self.search_scale:g}: give over 0 to 1000, or none")
         if self.grid_m is not None and not 0.1 <= self.grid_m <= 100:
             raise UsageError(f"grid_m {self.grid_m:g}: give 0.1 to 100 m, or none")
+
+    @property
+    def needs(self) -> frozenset[Need]:
+        """A survey, and channels if they are kept apart."""
+        return frozenset({Need.SURVEY, Need.CHANNELS} if self.separate else {Need.SURVEY})
 
     def ellipse(self, last: Belief | None) -> SearchEllipse | None:
         """Where to look after a last belief: Eq 10 to 13."""
